@@ -1,0 +1,9 @@
+"""From a triangle mesh to a rigid body of evenly spaced surface particles. Knows neither ROS nor sand_sim."""
+
+from sampler.body import ParticleBody, sample_body
+from sampler.distance import SignedDistance
+from sampler.errors import MeshError
+from sampler.location import locate_mesh
+from sampler.reading import read_mesh
+
+__all__ = ["MeshError", "ParticleBody", "SignedDistance", "locate_mesh", "read_mesh", "sample_body"]

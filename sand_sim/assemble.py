@@ -1,0 +1,213 @@
+"""From a checked Scene to the arrays of a solver: the only place that knows both."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_body
+from sand_sim import rotation
+from sand_sim.contact.contact import contact_types
+from sand_sim.contact.damping import damping_ratio
+from sand_sim.contact.normal import NORMAL_LAWS
+from sand_sim.contact.response import ContactModel
+from sand_sim.engine.arrays import DemArrays, Setting
+from sand_sim.engine.device import open_device
+from sand_sim.engine.explicit_dem import ExplicitDem
+from sand_sim.engine.grains import GrainTable
+from sand_sim.engine.lattice import Lattice
+from sand_sim.engine.precision import PRECISIONS, Precision
+from sand_sim.engine.recipe import Recipe
+from sand_sim.engine.surfaces import CYLINDER, PLANE, surface_type
+from sand_sim.engine.tool_body import ToolBody
+from sand_sim.scene.filling import fill_grains
+from sand_sim.scene.time_step import TimeStep, choose_time_step, effective_shear, effective_young, fastest_speed
+from sand_sim.scene.types import Scene, SceneError, Tool
+from sand_sim.scene.walls import Wall, walls_of
+
+_SKIN = 0.25  # of the mean grain radius
+_MARGIN = 0.25  # of the scene's largest edge, free around everything in it
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class ToolModel:
+    """A tool with its mesh and its particles, both in the tool frame [m]."""
+
+    tool: Tool
+    mesh: trimesh.Trimesh
+    body: ParticleBody
+
+    @property
+    def extent(self) -> float:
+        """Farthest particle surface from the tool frame's origin [m]."""
+        return float(np.linalg.norm(self.body.points, axis=1).max() + self.body.radius)
+
+    def distance(self, position: np.ndarray) -> np.ndarray:
+        """Distance of world points, shape (n, 3), from the particles' hull at the initial pose, shape (n,) [m]."""
+        pose = self.tool.pose
+        local = rotation.rotate(rotation.inverse(np.asarray(pose.orientation)), position - np.asarray(pose.position))
+        return SignedDistance(self.mesh).query(local)[0] - self.body.radius
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """A scene ready to run.
+
+    Attributes:
+        scene: what it was made from.
+        fill_numbers: grains of each fill; their identities follow one another.
+        walls: analytic surfaces.
+        tools: in the order of the scene.
+        time_step: chosen, with its reasons.
+        frame_steps: steps per frame.
+        lattice: the domain.
+        recipe: static choices.
+        solver: holds the device arrays.
+    """
+
+    scene: Scene
+    fill_numbers: list[int]
+    walls: list[Wall]
+    tools: list[ToolModel]
+    time_step: TimeStep
+    frame_steps: int
+    lattice: Lattice
+    recipe: Recipe
+    solver: ExplicitDem
+
+
+def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> Assembly:
+    """Make grains, walls, tools and the solver of a scene.
+
+    Args:
+        scene: checked.
+        progress: called with the name of a stage and the share of it that is done, 0 to 1.
+
+    Raises:
+        SceneError: if a mesh, a fill or the time step cannot be used; the message names the field.
+    """
+    try:
+        device = open_device(scene.solver.device, scene.solver.threads)
+    except ValueError as error:
+        raise SceneError(f"solver.device: {error}") from None
+    tools = [_model_tool(tool, scene, progress) for tool in scene.tools]
+    walls = [wall for boundary in scene.boundaries for wall in walls_of(boundary)]
+    order = _material_order(scene)
+    fills = [
+        fill_grains(fill, scene.materials[scene.material_index(fill.material)], order.index(fill.material), [*walls, *tools])
+        for fill in scene.fills
+    ]
+    table = GrainTable.join(fills)
+    time_step, frame_steps = _time_step(scene, table, order)
+    precision = PRECISIONS[scene.solver.precision]
+    lattice = _lattice(scene, table, walls, tools, precision)
+    recipe = Recipe(
+        contact=ContactModel(scene.contact.normal, scene.contact.tangential),
+        precision=precision,
+        materials=len({fill.material for fill in scene.fills}) > 1,
+    )
+    skin = scene.solver.skin or _SKIN * float(table.radius.mean())
+    arrays = DemArrays(
+        recipe,
+        Setting(np.asarray(scene.gravity), time_step.value, skin),
+        lattice,
+        table,
+        [_surface(wall, order, lattice) for wall in walls],
+        [ToolBody(tool.body.points, tool.body.radius, order.index(tool.tool.material)) for tool in tools],
+        _pair_table(scene, order, precision),
+        device.lanes,
+        device.name,
+    )
+    numbers = [len(fill) for fill in fills]
+    return Assembly(scene, numbers, walls, tools, time_step, frame_steps, lattice, recipe, ExplicitDem(arrays, device))
+
+
+def _model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
+    try:
+        mesh = read_mesh(locate_mesh(tool.mesh, scene.folder), tool.scale)
+        body = sample_body(mesh, tool.particle_radius, progress=lambda share: progress(f"sampling {tool.name}", share))
+    except MeshError as error:
+        raise SceneError(f"tools.{tool.name}.mesh: {error}") from None
+    return ToolModel(tool, mesh, body)
+
+
+def _material_order(scene: Scene) -> list[str]:
+    """Names of the materials, those of grains first, so that with one grain material its index is zero."""
+    grains = {fill.material for fill in scene.fills}
+    return sorted((m.name for m in scene.materials), key=lambda name: name not in grains)
+
+
+def _time_step(scene: Scene, table: GrainTable, order: list[str]) -> tuple[TimeStep, int]:
+    """The step, shortened so that a whole number of steps makes a frame unless the scene gives it, and that number."""
+    down = np.asarray(scene.gravity) / (np.linalg.norm(scene.gravity) or 1.0)
+    depth = table.position @ down
+    given = float(np.linalg.norm(table.velocity, axis=1).max())
+    speed = fastest_speed(scene, float(np.ptp(depth)), 0.0, given)
+    smallest = {order[k]: float(table.radius[table.material == k].min()) for k in np.unique(table.material)}
+    chosen = choose_time_step(scene, smallest, speed)
+    frame = 1.0 / scene.frame_rate
+    if scene.solver.time_step is not None:
+        return chosen, max(1, round(frame / chosen.value))
+    steps = int(np.ceil(frame / chosen.value))
+    return TimeStep(frame / steps, chosen.safe, chosen.contact, chosen.rayleigh, chosen.speed, chosen.reason), steps
+
+
+def _lattice(scene: Scene, table: GrainTable, walls: list[Wall], tools: list[ToolModel], precision: Precision) -> Lattice:
+    reserve = 1.05 * max((tool.extent for tool in tools), default=0.0)
+    if scene.domain is not None:
+        return Lattice(*(np.asarray(corner, float) for corner in scene.domain), precision, reserve)
+    corners = [table.position - table.radius[:, None], table.position + table.radius[:, None]]
+    for fill in scene.fills:
+        if fill.low is not None:
+            corners.append(np.array([fill.low, fill.high]))
+    for boundary in scene.boundaries:
+        if boundary.kind == "box":
+            corners.append(np.array([boundary.low, boundary.high]))
+    for tool in tools:
+        poses = [tool.tool.pose, *(waypoint.pose for waypoint in tool.tool.trajectory)]
+        stops = np.array([pose.position for pose in poses])
+        corners += [stops - tool.extent, stops + tool.extent]
+    corners = np.concatenate(corners)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    margin = _MARGIN * float(np.max(high - low))
+    return Lattice(low - margin, high + margin, precision, reserve)
+
+
+def _surface(wall: Wall, order: list[str], lattice: Lattice):
+    surface = surface_type(lattice.precision)()
+    surface.kind = PLANE if wall.kind == "plane" else CYLINDER
+    # The point of the surface nearest to the middle of the domain keeps lattice differences small and exact.
+    anchor = wall.point + (lattice.centre - wall.point) @ wall.direction * wall.direction
+    if wall.kind == "plane":
+        anchor = lattice.centre - (lattice.centre - wall.point) @ wall.direction * wall.direction
+    surface.anchor = lattice.precision.whole3(*(int(c) for c in lattice.to_lattice(anchor)))
+    surface.direction = lattice.precision.vec3(*wall.direction)
+    surface.radius = wall.radius
+    surface.material = order.index(wall.material)
+    return surface
+
+
+def _pair_table(scene: Scene, order: list[str], precision: Precision) -> list[list]:
+    """One ``MaterialPair`` per pair of materials; pairs that never meet stay empty."""
+    named = {m.name: m for m in scene.materials}
+    given = {frozenset(rule.between): rule for rule in scene.pairs}
+    exponent = NORMAL_LAWS[scene.contact.normal].exponent
+    table = []
+    for a in order:
+        row = []
+        for b in order:
+            pair = contact_types(precision).pair()
+            rule = given.get(frozenset((a, b)))
+            if rule:
+                pair.young = effective_young(named[a], named[b])
+                pair.shear = effective_shear(named[a], named[b])
+                pair.friction = rule.friction
+                twice = 2.0 * damping_ratio(rule.restitution, exponent)
+                pair.normal_damping = twice * np.sqrt(2.0 * pair.young)
+                pair.shear_damping = twice * np.sqrt(8.0 * pair.shear)
+            row.append(pair)
+        table.append(row)
+    return table

@@ -1,0 +1,149 @@
+"""Border 2, Command and Observation: all that passes between a world and ROS, Rerun, tests and the command line.
+
+Positions and directions are in the world frame (z up, REP-103) unless said otherwise; orientations are unit quaternions x y z w.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+class CommandError(ValueError):
+    """A command that was rejected; the world goes on as before.
+
+    Attributes:
+        reason: a short word for counting rejections.
+    """
+
+    def __init__(self, reason: str, message: str):
+        super().__init__(message)
+        self.reason = reason
+
+
+@dataclass(frozen=True)
+class ToolPose:
+    """Command: a tool shall have reached a pose at a time, moving there evenly from where it is then.
+
+    Attributes:
+        tool: name.
+        position: of the tool frame's origin, shape (3,) [m].
+        orientation: tool frame to world frame, shape (4,).
+        time: when it is reached [s] of simulated time; None leaves it to the pacing (see ``simulation.py``).
+    """
+
+    tool: str
+    position: np.ndarray
+    orientation: np.ndarray
+    time: float | None = None
+
+
+@dataclass(frozen=True)
+class GrainCloud:
+    """All grains that are in the domain, in the order of their identities.
+
+    Attributes:
+        identity: number in the scene's table, shape (n,), int.
+        position: shape (n, 3) [m], double.
+        velocity: shape (n, 3) [m/s].
+        spin: shape (n, 3) [rad/s]; zeros where grains do not turn.
+        radius: shape (n,) [m].
+        mass: shape (n,) [kg].
+    """
+
+    identity: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    radius: np.ndarray
+    mass: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.identity)
+
+    @property
+    def speed(self) -> np.ndarray:
+        """Speeds, shape (n,) [m/s]."""
+        return np.linalg.norm(self.velocity, axis=1)
+
+
+@dataclass(frozen=True)
+class ToolReport:
+    """What a tool does and feels.
+
+    Attributes:
+        name: of the tool.
+        position: of its frame's origin now, shape (3,) [m].
+        orientation: tool frame to world frame, shape (4,).
+        velocity: of the origin over the last step, shape (3,) [m/s].
+        spin: over the last step, shape (3,) [rad/s].
+        force: of the sand on the tool, mean over the frame, in the tool frame, shape (3,) [N].
+        torque: the same about the tool frame's origin, in the tool frame, shape (3,) [N m].
+        world_force: the mean force in the world frame, shape (3,) [N].
+        work: of the tool on the sand since the start [J].
+        carried: mass of the grains whose centres are inside the tool's bounding box [kg].
+    """
+
+    name: str
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    force: np.ndarray
+    torque: np.ndarray
+    world_force: np.ndarray
+    work: float
+    carried: float
+
+
+@dataclass(frozen=True)
+class Health:
+    """How far a run can be trusted.
+
+    Attributes:
+        time_step: [s].
+        step_ratio: time step over the safe one [1].
+        deepest: largest overlap over grain radius since the start [1].
+        kinetic, potential, elastic: energies now [J]; potential against the start.
+        tool_work: of all tools on the sand since the start [J].
+        dissipated: what is missing from the balance of the above since the start [J]; negative means energy came from nowhere.
+        fastest: largest grain speed [m/s].
+        contacts: contacts under load.
+        retired: grains that have left the domain.
+        doubts: why the run should not be trusted, empty if nothing speaks against it.
+    """
+
+    time_step: float
+    step_ratio: float
+    deepest: float
+    kinetic: float
+    potential: float
+    elastic: float
+    tool_work: float
+    dissipated: float
+    fastest: float
+    contacts: int
+    retired: int
+    doubts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What a world shows after a frame.
+
+    Attributes:
+        time: simulated [s].
+        steps: since the start.
+        grains: all grains.
+        tools: one report per tool, in the order of the scene.
+        health: error indicators.
+    """
+
+    time: float
+    steps: int
+    grains: GrainCloud
+    tools: tuple[ToolReport, ...]
+    health: Health
+
+    def tool(self, name: str) -> ToolReport:
+        """The report of a tool by its name."""
+        return next(report for report in self.tools if report.name == name)

@@ -1,0 +1,38 @@
+"""Progress on the console: one line that is written over on a terminal, now and then a line elsewhere."""
+
+import sys
+import time
+
+_EVERY = 5.0  # [s] between lines where lines cannot be written over
+
+
+class Console:
+    """Shows where long work is."""
+
+    def __init__(self, stream=sys.stderr):
+        self._stream, self._shown, self._open = stream, 0.0, False
+        self._stage = ""
+
+    def stage(self, name: str, share: float) -> None:
+        """Show the share of a stage that is done, 0 to 1."""
+        if name != self._stage or share >= 1.0 or self._stream.isatty():
+            self.line(f"{name} {100.0 * share:3.0f} %", force=name != self._stage or share >= 1.0)
+            self._stage = name
+        if share >= 1.0:
+            self.end()
+
+    def line(self, text: str, force: bool = False) -> None:
+        """Show one line; where it cannot be written over only every few seconds unless forced."""
+        now = time.monotonic()
+        if self._stream.isatty():
+            print(f"\r\x1b[K{text}", end="", file=self._stream, flush=True)
+            self._open = True
+        elif force or now - self._shown > _EVERY:
+            print(text, file=self._stream, flush=True)
+            self._shown = now
+
+    def end(self) -> None:
+        """Leave the line as it stands."""
+        if self._open:
+            print(file=self._stream)
+            self._open = False

@@ -1,0 +1,72 @@
+"""Dig: start the node on a scene and a client that drives its tools, then show what came of it."""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from sand_sim.config_folder import find_scene
+from sand_sim.interruption import Interruption
+from sand_sim.report import summary_text
+from sand_sim.scene.reading import load_scene
+
+_PATIENCE = 20.0  # [s] for a process to end by itself after it was asked to
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("scene", nargs="?", default="dig", help="scene file or name (default: dig)")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for recording, history, summary and figure")
+    parser.add_argument("--view", action="store_true", help="open the Rerun viewer")
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Run the verb."""
+    path = find_scene(options.scene)
+    scene = load_scene(path)
+    interruption = Interruption()
+    parameters = {
+        "scene": str(path),
+        "pacing": "lockstep",
+        "duration": scene.duration,
+        "recording": str(options.out / f"{scene.name}.rrd"),
+        "output": str(options.out),
+        "view": options.view,
+    }
+    assignments = [word for name, value in parameters.items() for word in ("-p", f"{name}:={json.dumps(value)}")]
+    # The demo talks to itself only, whatever else runs on the network.
+    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **os.environ}
+    summary = options.out / f"{scene.name}.json"
+    summary.unlink(missing_ok=True)
+    node = _start(["-m", "sand_sim.node", "--ros-args", *assignments], environment)
+    client = _start(["-m", "sand_sim", "play", str(path)], environment)
+    while node.poll() is None:
+        try:
+            node.wait(0.2)
+        except subprocess.TimeoutExpired:
+            if interruption.asked:
+                break
+    for process in (client, node):
+        _end(process)
+    if not summary.is_file():
+        return 130 if interruption.asked else node.returncode or 1
+    print(f"{scene.name}:\n{summary_text(json.loads(summary.read_text()))}")
+    print("written: " + ", ".join(str(options.out / f"{scene.name}.{kind}") for kind in ("rrd", "png", "npz", "json")))
+    return 130 if interruption.asked else node.returncode
+
+
+def _start(words: list[str], environment: dict[str, str]) -> subprocess.Popen:
+    """A Python process in a group of its own, so that Ctrl-C reaches it through us and only once."""
+    return subprocess.Popen([sys.executable, *words], env=environment, start_new_session=True)
+
+
+def _end(process: subprocess.Popen) -> None:
+    if process.poll() is None:
+        process.terminate()
+    try:
+        process.wait(_PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

@@ -1,0 +1,37 @@
+"""``sand_sim VERB``: robots digging and scooping sand, grain by grain."""
+
+import argparse
+import sys
+
+from sand_sim.cli import demo, play, run
+from sand_sim.scene.types import SceneError
+
+_VERBS = (run, demo, play)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line.
+
+    Returns:
+        Exit code: 0 done, 1 refused with one line that says why, 130 interrupted.
+    """
+    parser = argparse.ArgumentParser(prog="sand_sim", description=__doc__.split(": ", 1)[1])
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
+    for verb in _VERBS:
+        name = verb.__name__.rsplit(".", 1)[-1]
+        first = verb.__doc__.split("\n", 1)[0]
+        one = verbs.add_parser(name, help=first, description=first)
+        verb.add_arguments(one)
+        one.set_defaults(execute=verb.execute)
+    options = parser.parse_args(arguments)
+    try:
+        return options.execute(options)
+    except SceneError as error:
+        print(f"sand_sim: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

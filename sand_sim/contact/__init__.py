@@ -1,0 +1,1 @@
+"""Contact physics: what a contact is, and one law per slot."""

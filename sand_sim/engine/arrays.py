@@ -1,0 +1,123 @@
+"""All arrays of an explicit DEM world, and only those that its scene needs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from sand_sim.contact.contact import contact_types
+from sand_sim.engine import energy, tool_contacts
+from sand_sim.engine.cells import prepare_cells
+from sand_sim.engine.contact_list import ContactList
+from sand_sim.engine.count import Count
+from sand_sim.engine.flags import Flags
+from sand_sim.engine.grains import Grains, GrainTable
+from sand_sim.engine.lattice import Lattice
+from sand_sim.engine.recipe import Recipe
+from sand_sim.engine.sorting import SortedItems
+from sand_sim.engine.surfaces import surface_type
+from sand_sim.engine.tool_body import ToolBody, Tools
+
+_ROOM_TO_SPARE = 1.25
+_FIRST_PAIRS = 5  # room for contacts per grain to begin with
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The numbers of a world; another value never recompiles.
+
+    Attributes:
+        gravity: shape (3,) [m/s^2].
+        dt: time step [s].
+        skin: distance beyond touch at which contacts are listed [m].
+    """
+
+    gravity: np.ndarray
+    dt: float
+    skin: float
+
+
+class DemArrays:
+    """State and scratch of a world on its device.
+
+    Args:
+        recipe: static choices.
+        setting: numbers.
+        lattice: the domain.
+        table: the grains.
+        walls: ``Surface`` structs.
+        bodies: tools.
+        pairs: ``MaterialPair`` structs, one row per material.
+        lanes: of the device.
+        device: Warp device.
+    """
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        setting: Setting,
+        lattice: Lattice,
+        table: GrainTable,
+        walls: list,
+        bodies: list[ToolBody],
+        pairs: list,
+        lanes: int,
+        device: str,
+    ):
+        self.recipe, self.setting, self.lattice, self.lanes, self.device = recipe, setting, lattice, lanes, device
+        precision, number = recipe.precision, len(table)
+        self.flags = Flags(device)
+        self.grains = Grains(table, lattice, recipe, lanes, device)
+        self.kinds = len(pairs)
+        rows = [pair for row in pairs for pair in row]
+        self.pairs = wp.array(rows, dtype=contact_types(precision).pair, device=device)
+        self.deepest = wp.zeros(lanes, dtype=precision.real, device=device)
+        self.fastest = wp.zeros(lanes, dtype=precision.real, device=device)
+
+        self.cells = prepare_cells(table.radius, setting.skin, lattice, lanes, device)
+        self.in_cells = SortedItems.allocate(self.cells.room, number, lanes, device)
+        self.keys = wp.zeros(number, dtype=int, device=device)
+        self.spare = {array.dtype: wp.zeros_like(array) for array in self.grains.sorted_arrays}
+        self.every_start = Count(number + 1, lanes, device)
+        self.every_start.set(number + 1)
+        self.met = SortedItems.allocate(number, 0, lanes, device)
+
+        self.pair_list = self._contact_list(_FIRST_PAIRS * number)
+        self.walls = wp.array(walls, dtype=surface_type(precision), device=device) if walls else None
+        self.wall_list = self._contact_list(number) if walls else None
+        farthest = float(table.radius.max()) + setting.skin
+        self.tools = Tools(bodies, farthest, precision, device) if bodies else None
+        self.tool_list = self._contact_list(max(number // 4, 64)) if bodies else None
+        self.grain_blocks = wp.zeros(energy.blocks_for(number), dtype=wp.vec3d, device=device)
+        self.make_room()
+
+    @property
+    def lists(self) -> dict[str, ContactList]:
+        """The contact lists that the scene needs, by name."""
+        named = {"pair": self.pair_list, "wall": self.wall_list, "tool": self.tool_list}
+        return {name: contacts for name, contacts in named.items() if contacts is not None}
+
+    def make_room(self) -> None:
+        """Enlarge the lists that want more room than they have. Recorded programs speak of the old arrays afterwards."""
+        for contacts in self.lists.values():
+            wanted = int(contacts.wanted.numpy()[0])
+            if wanted > contacts.pairs.capacity:
+                contacts.make_room(int(_ROOM_TO_SPARE * wanted))
+        self.met = SortedItems.allocate(self.grains.capacity, self.pair_list.pairs.capacity, self.lanes, self.device)
+        precision = self.recipe.precision
+        self.energy = {
+            name: wp.zeros(c.pairs.capacity, dtype=precision.real, device=self.device) for name, c in self.lists.items()
+        }
+        self.energy_blocks = {
+            name: wp.zeros(energy.blocks_for(c.pairs.capacity), dtype=wp.vec2d, device=self.device)
+            for name, c in self.lists.items()
+        }
+        if self.tools:
+            room = self.tool_list.pairs.capacity
+            blocks = -(-room // tool_contacts.SUM_BLOCK)
+            self.lever = wp.zeros(room, dtype=precision.vec3, device=self.device)
+            self.wrench_blocks = wp.zeros((blocks * self.tools.number, 2), dtype=wp.vec3d, device=self.device)
+
+    def _contact_list(self, room: int) -> ContactList:
+        recipe = self.recipe
+        return ContactList(room, self.grains.capacity, recipe.precision, recipe.history, recipe.rotation, self.lanes, self.device)

@@ -1,0 +1,161 @@
+"""Which spheres may touch what: lists with a skin, one each for grain pairs, grains at walls and grains at tools.
+
+A list holds, grain after grain, the partners within reach. It stays valid until something has moved half the skin. When it is
+rebuilt, the history of contacts that go on is carried over, also when the grains have been renumbered meanwhile.
+"""
+
+from functools import cache
+
+import warp as wp
+
+from sand_sim.engine.count import Count, share_out
+from sand_sim.engine.flags import FAULT_ROOM, Flags
+from sand_sim.engine.kernel import kernel
+from sand_sim.engine.precision import Precision
+from sand_sim.engine.sorting import record_running_totals
+
+
+class ContactList:
+    """Contacts of one kind, with what the forces leave in them.
+
+    Attributes:
+        pairs: number of listed contacts and the room for them.
+        starts: contacts of grain i are ``starts[i]`` to ``starts[i + 1]``, int, shape (grains + 1,).
+        owner: the grain, int, shape (room,).
+        partner: the other grain, the wall or the tool particle, int, shape (room,).
+        force: on the owner, vec3, shape (room,) [N].
+        couple: tangential torque per lever arm (vec3 [N]) and half the overlap [m], vec4, shape (room,); None without rotation.
+        spring: tangential history, vec3, shape (room,) [m]; None without history.
+        wanted: contacts found by the last search, int, shape (1,).
+    """
+
+    def __init__(self, room: int, grains: int, precision: Precision, history: bool, rotation: bool, lanes: int, device: str):
+        self.precision, self.history, self.rotation, self.device = precision, history, rotation, device
+        self.pairs = Count(0, lanes, device)
+        self.counts, self.totals = wp.zeros(grains, dtype=int, device=device), wp.zeros(lanes, dtype=int, device=device)
+        self.starts, self.new_starts, self.old_starts = (wp.zeros(grains + 1, dtype=int, device=device) for _ in range(3))
+        self.wanted = wp.zeros(1, dtype=int, device=device)
+        self.partner = self.spring = None
+        self.make_room(room)
+
+    def make_room(self, room: int) -> None:
+        """Enlarge the list; its contents stay."""
+        vec3, vec4 = self.precision.vec3, self.precision.vec4
+        self.pairs.capacity = room
+        self.owner = wp.zeros(room, dtype=int, device=self.device)
+        self.partner = self._enlarged(self.partner, int)
+        self.old_partner = wp.zeros(room, dtype=int, device=self.device)
+        self.force = wp.zeros(room, dtype=vec3, device=self.device)
+        self.couple = wp.zeros(room, dtype=vec4, device=self.device) if self.rotation else None
+        self.spring = self._enlarged(self.spring, vec3) if self.history else None
+
+    def _enlarged(self, old: wp.array | None, dtype: type) -> wp.array:
+        new = wp.zeros(self.pairs.capacity, dtype=dtype, device=self.device)
+        if old is not None:
+            wp.copy(new, old, count=old.shape[0])
+        return new
+
+
+@wp.func
+def listed_at(starts: wp.array(dtype=int), partner: wp.array(dtype=int), grain: int, other: int) -> int:
+    """Index of the contact of a grain with a partner, or -1 if it is not listed."""
+    found = int(-1)
+    for contact in range(starts[grain], starts[grain + 1]):
+        if partner[contact] == other:
+            found = contact
+    return found
+
+
+@kernel
+def check_room(
+    starts: wp.array(dtype=int),
+    grain_spans: wp.array(dtype=int),
+    room: int,
+    wanted: wp.array(dtype=int),
+    proceed: wp.array(dtype=int),
+    running: wp.array(dtype=int),
+    fault: wp.array(dtype=int),
+):
+    """Stop before anything is written if the contacts found do not fit; nothing is ever dropped."""
+    number = starts[grain_spans[grain_spans.shape[0] - 1]]
+    wanted[0] = number
+    if number > room:
+        proceed[0] = 0
+        running[0] = 0
+        fault[0] = fault[0] | wp.static(FAULT_ROOM)
+
+
+@kernel
+def set_pairs(pair_spans: wp.array(dtype=int), wanted: wp.array(dtype=int)):
+    """Share the contacts found out over the lanes."""
+    share_out(pair_spans, wanted[0])
+
+
+@kernel
+def keep_starts(
+    lane: int,
+    spans: wp.array(dtype=int),
+    stride: int,
+    found: wp.array(dtype=int),
+    starts: wp.array(dtype=int),
+    old: wp.array(dtype=int),
+):
+    """Put the starts of the last list aside and the new ones in place."""
+    for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+        old[i] = starts[i]
+        starts[i] = found[i]
+
+
+@cache
+def build_keep_contacts(precision: Precision, history: bool) -> wp.Kernel:
+    """Kernel that puts partners and springs of the last list aside; the force array, idle now, serves as the drawer."""
+    vec3 = precision.vec3
+
+    @kernel
+    def keep_contacts(
+        lane: int,
+        spans: wp.array(dtype=int),
+        stride: int,
+        partner: wp.array(dtype=int),
+        spring: wp.array(dtype=vec3),
+        old_partner: wp.array(dtype=int),
+        drawer: wp.array(dtype=vec3),
+    ):
+        for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            old_partner[i] = partner[i]
+            if wp.static(history):
+                drawer[i] = spring[i]
+
+    return keep_contacts
+
+
+def record_count(recorder, contacts: ContactList, grains: Count, counting, flags: Flags) -> None:
+    """Count the contacts of each grain with ``counting()``, a launch that writes ``contacts.counts``, and see that they fit."""
+    counting()
+    record_running_totals(recorder, contacts.counts, grains, contacts.totals, contacts.new_starts)
+    recorder.once(
+        check_room,
+        [contacts.new_starts, grains.spans, contacts.pairs.capacity, contacts.wanted, flags.proceed, flags.running, flags.fault],
+    )
+
+
+def record_fill(recorder, contacts: ContactList, grain_starts: Count, filling) -> None:
+    """Write the contacts counted before with ``filling()``, which finds the last list in ``old_*`` and ``force``.
+
+    Args:
+        recorder: where the launches go.
+        contacts: the list.
+        grain_starts: as many items as the list has starts, retired grains of the last list included.
+        filling: launch that writes owner, partner and spring.
+    """
+    recorder.each(keep_starts, grain_starts, [contacts.new_starts, contacts.starts, contacts.old_starts], wait=False)
+    if contacts.history:
+        recorder.each(
+            build_keep_contacts(contacts.precision, contacts.history),
+            contacts.pairs,
+            [contacts.partner, contacts.spring, contacts.old_partner, contacts.force],
+        )
+    else:
+        recorder.wait()
+    recorder.once(set_pairs, [contacts.pairs.spans, contacts.wanted])
+    filling()

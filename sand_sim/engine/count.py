@@ -1,0 +1,39 @@
+"""How many of something there are, kept on the device and shared out over the lanes that work on it."""
+
+import warp as wp
+
+_ALIGNMENT = 16  # items per shared cache line, so that two cores never write to the same line
+
+
+class Count:
+    """A number of items that kernels may change, with room for ``capacity`` of them.
+
+    Attributes:
+        capacity: items that the arrays of this population can hold.
+        spans: int array, shape (lanes + 1,); lane k works on items ``spans[k]`` to ``spans[k + 1]``, the last is the number.
+    """
+
+    def __init__(self, capacity: int, lanes: int, device: str):
+        self.capacity = capacity
+        self.lanes = lanes
+        self.spans = wp.zeros(lanes + 1, dtype=int, device=device)
+
+    def set(self, number: int) -> None:
+        """Set the number of items from the host."""
+        share = -(-max(number, 1) // self.lanes)
+        share = -(-share // _ALIGNMENT) * _ALIGNMENT
+        self.spans.assign([min(k * share, number) for k in range(self.lanes + 1)])
+
+    def get(self) -> int:
+        """Read the number of items on the host; waits for the device."""
+        return int(self.spans.numpy()[self.lanes])
+
+
+@wp.func
+def share_out(spans: wp.array(dtype=int), number: int):
+    """Device side of ``Count.set``."""
+    lanes = spans.shape[0] - 1
+    share = (wp.max(number, 1) + lanes - 1) // lanes
+    share = (share + wp.static(_ALIGNMENT) - 1) // wp.static(_ALIGNMENT) * wp.static(_ALIGNMENT)
+    for k in range(lanes + 1):
+        spans[k] = wp.min(k * share, number)

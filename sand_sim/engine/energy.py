@@ -1,0 +1,88 @@
+"""Sums over all grains and contacts, in blocks of fixed size so that they do not depend on the number of lanes."""
+
+from functools import cache
+
+import warp as wp
+
+from sand_sim.engine.kernel import kernel
+from sand_sim.engine.precision import Precision
+from sand_sim.engine.recipe import Recipe
+
+BLOCK = 256  # items per partial sum
+
+
+def blocks_for(items: int) -> int:
+    """Partial sums for a number of items."""
+    return -(-items // BLOCK)
+
+
+@cache
+def build_grain_energy(recipe: Recipe) -> wp.Kernel:
+    """Kernel for energies of grains: ``blocks`` holds translation, rotation and height [J], ``fastest`` the top speed [m/s]."""
+    precision, rotation = recipe.precision, recipe.rotation
+    real, whole, vec3, vec4, whole4 = precision.real, precision.whole, precision.vec3, precision.vec4, precision.whole4
+
+    @kernel
+    def grain_energy(
+        lane: int,
+        lanes: int,
+        spans: wp.array(dtype=int),
+        place: wp.array(dtype=whole4),
+        motion: wp.array(dtype=vec4),
+        spin: wp.array(dtype=vec4),
+        gravity: vec3,
+        quantum: real,
+        blocks: wp.array(dtype=wp.vec3d),
+        fastest: wp.array(dtype=real),
+    ):
+        grains = spans[spans.shape[0] - 1]
+        number = (grains + wp.static(BLOCK) - 1) // wp.static(BLOCK)
+        top = real(0.0)
+        for block in range(number * lane // lanes, number * (lane + 1) // lanes):
+            total = wp.vec3d(wp.float64(0.0))
+            first = block * wp.static(BLOCK)
+            for i in range(first, wp.min(first + wp.static(BLOCK), grains)):
+                here = place[i]
+                if here[3] > whole(0):
+                    of_i = motion[i]
+                    velocity = vec3(of_i[0], of_i[1], of_i[2])
+                    square = wp.dot(velocity, velocity)
+                    top = wp.max(top, square)
+                    height = -wp.dot(gravity, vec3(real(here[0]), real(here[1]), real(here[2])) * quantum)
+                    turning = real(0.0)
+                    if wp.static(rotation):
+                        spinning = spin[i]
+                        omega = vec3(spinning[0], spinning[1], spinning[2])
+                        turning = spinning[3] * wp.dot(omega, omega)
+                    total += wp.vec3d(
+                        wp.float64(real(0.5) * of_i[3] * square),
+                        wp.float64(real(0.5) * turning),
+                        wp.float64(of_i[3] * height),
+                    )
+            blocks[block] = total
+        fastest[lane] = wp.sqrt(top)
+
+    return grain_energy
+
+
+@cache
+def build_contact_energy(precision: Precision) -> wp.Kernel:
+    """Kernel that sums the energies stored in contacts [J] and counts those that touch."""
+    real = precision.real
+
+    @kernel
+    def contact_energy(
+        lane: int, lanes: int, spans: wp.array(dtype=int), energy: wp.array(dtype=real), blocks: wp.array(dtype=wp.vec2d)
+    ):
+        contacts = spans[spans.shape[0] - 1]
+        number = (contacts + wp.static(BLOCK) - 1) // wp.static(BLOCK)
+        for block in range(number * lane // lanes, number * (lane + 1) // lanes):
+            total = wp.vec2d(wp.float64(0.0))
+            first = block * wp.static(BLOCK)
+            for contact in range(first, wp.min(first + wp.static(BLOCK), contacts)):
+                stored = wp.float64(energy[contact])
+                if stored > wp.float64(0.0):
+                    total += wp.vec2d(stored, wp.float64(1.0))
+            blocks[block] = total
+
+    return contact_energy

@@ -1,0 +1,147 @@
+"""The explicit DEM solver: runs its recorded stages, makes room where lists grow, and gives away its whole state."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sand_sim.engine.arrays import DemArrays
+from sand_sim.engine.energy import blocks_for
+from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_ROOM
+from sand_sim.engine.stages import choose_stages, record_measurement, record_renewal, record_run
+from sand_sim.engine.state import put_state, take_state
+
+
+class UnstableError(RuntimeError):
+    """A velocity is no longer a number: the time step does not resolve the contacts."""
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Sums over all grains and contacts now.
+
+    Attributes:
+        translation, rotation: kinetic energies [J].
+        height: potential energy against the middle of the domain [J].
+        elastic: energy stored in contacts [J].
+        touching: contacts under load.
+        fastest: largest grain speed [m/s].
+        deepest: largest overlap over the smaller radius since the start [1].
+    """
+
+    translation: float
+    rotation: float
+    height: float
+    elastic: float
+    touching: int
+    fastest: float
+    deepest: float
+
+
+class ExplicitDem:
+    """Grains, walls and tools under explicit time integration.
+
+    Args:
+        arrays: state and scratch.
+        device: ``lanes.CpuDevice`` or its like, with as many lanes as the arrays.
+    """
+
+    def __init__(self, arrays: DemArrays, device):
+        self.arrays, self.device = arrays, device
+        self.stages = choose_stages(arrays)
+        self._programs = {}
+        self.expect_moves()
+
+    @property
+    def steps_done(self) -> int:
+        """Steps since time zero."""
+        return int(self.arrays.flags.steps_done.numpy()[0])
+
+    def expect_moves(self) -> None:
+        """Renew all contact lists before the next step: something has been moved from outside."""
+        self.arrays.flags.grains_moved.fill_(1)
+        self.arrays.flags.tools_moved.fill_(1)
+
+    def run(self, steps: int) -> None:
+        """Advance by a number of steps.
+
+        Raises:
+            UnstableError: if a velocity is no longer finite.
+        """
+        left = self.arrays.flags.steps_left
+        left.fill_(steps)
+        while int(left.numpy()[0]) > 0:
+            self._play(record_run)
+
+    def begin(self) -> None:
+        """Make this moment time zero: renew the lists and forget what has been counted and summed up."""
+        arrays = self.arrays
+        self._play(record_renewal)
+        while int(arrays.flags.grains_moved.numpy()[0]):
+            self._play(record_renewal)
+        arrays.flags.steps_done.zero_()
+        arrays.deepest.zero_()
+        arrays.grains.retired.zero_()
+        if arrays.tools:
+            for sum_so_far in (arrays.tools.wrench, arrays.tools.impulse, arrays.tools.work):
+                sum_so_far.zero_()
+
+    def remove(self, identities: np.ndarray) -> None:
+        """Retire grains by their identities, shape (n,)."""
+        grains = self.arrays.grains
+        active = grains.active.get()
+        place = grains.place.numpy().copy()
+        gone = np.flatnonzero(np.isin(grains.identity.numpy()[:active], identities))
+        place[gone] = [self.arrays.lattice.end] * 3 + [0]
+        grains.place.assign(place)
+        self.expect_moves()
+
+    def measure(self) -> Sums:
+        """Sum energies and contacts over all lists as they stand."""
+        arrays = self.arrays
+        self._program(record_measurement)()
+        grains = arrays.grain_blocks.numpy()[: blocks_for(arrays.grains.active.get())]
+        translation, rotation, height = grains.sum(axis=0)
+        contacts = np.zeros(2)
+        for name, listed in arrays.lists.items():
+            contacts += arrays.energy_blocks[name].numpy()[: blocks_for(listed.pairs.get())].sum(axis=0)
+        return Sums(
+            float(translation),
+            float(rotation),
+            float(height),
+            float(contacts[0]),
+            int(contacts[1]),
+            float(arrays.fastest.numpy().max()),
+            float(arrays.deepest.numpy().max()),
+        )
+
+    def take_state(self) -> dict[str, np.ndarray]:
+        """Copy the whole state to the host."""
+        return take_state(self.arrays)
+
+    def put_state(self, state: dict[str, np.ndarray]) -> None:
+        """Put a state of the same scene back."""
+        if put_state(self.arrays, state):
+            self._programs.clear()
+
+    def _play(self, record) -> None:
+        """Play a program once; where a list had no room it has stopped early, and there is room when it is played again."""
+        flags = self.arrays.flags
+        flags.running.fill_(1)
+        flags.proceed.fill_(1)
+        self._program(record)()
+        fault = int(flags.fault.numpy()[0])
+        flags.fault.zero_()
+        if fault & FAULT_NOT_FINITE:
+            raise UnstableError(
+                f"a grain's velocity is not finite after step {self.steps_done}; "
+                f"take a smaller time step than {self.arrays.setting.dt:.3g} s"
+            )
+        if fault & FAULT_ROOM:
+            self.arrays.make_room()
+            self._programs.clear()
+
+    def _program(self, record):
+        """The recorded program, recorded at its first use since the arrays were last replaced."""
+        if record not in self._programs:
+            self._programs[record] = self.device.record(lambda recorder: record(self.arrays, self.stages, recorder))
+        return self._programs[record]

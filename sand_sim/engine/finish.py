@@ -1,0 +1,113 @@
+"""The end of a step, on one thread: wrenches summed, tools moved on, counters and flags brought up to date."""
+
+from functools import cache
+
+import warp as wp
+
+from sand_sim.engine.kernel import kernel
+from sand_sim.engine.precision import Precision
+from sand_sim.engine.tool_contacts import SUM_BLOCK
+from sand_sim.engine.tools import ToolTrack, build_tool_state_at, tool_types
+
+
+@cache
+def build_place_tools(precision: Precision) -> wp.Kernel:
+    """Kernel that puts all tools where they are at the present step, and flags the tool list if one has moved too far since.
+
+    ``travelled`` has shape (tools,): an upper bound of how far any particle of a tool has moved since the list was made [m].
+    """
+    shape_type, state_type = tool_types(precision)
+    tool_state_at = build_tool_state_at(precision)
+
+    @kernel
+    def place_tools(
+        tracks: wp.array(dtype=ToolTrack),
+        shapes: wp.array(dtype=shape_type),
+        states: wp.array(dtype=state_type),
+        centre: wp.vec3d,
+        inverse_quantum: wp.float64,
+        end: wp.float64,
+        dt: wp.float64,
+        steps_done: wp.array(dtype=wp.int64),
+        travelled: wp.array(dtype=wp.float64),
+        allowance: wp.float64,
+        tools_moved: wp.array(dtype=int),
+    ):
+        time = wp.float64(steps_done[0]) * dt
+        for tool in range(tracks.shape[0]):
+            track = tracks[tool]
+            if time > track.begin_time and time - dt < track.end_time:
+                rate = wp.length(track.velocity) + wp.length(track.spin) * wp.float64(shapes[tool].extent)
+                travelled[tool] = travelled[tool] + rate * dt
+                if travelled[tool] > allowance:
+                    tools_moved[0] = 1
+            states[tool] = tool_state_at(track, time, centre, inverse_quantum, end)
+
+    return place_tools
+
+
+@kernel
+def sum_wrenches(
+    pair_spans: wp.array(dtype=int),
+    blocks: wp.array2d(dtype=wp.vec3d),
+    dt: wp.float64,
+    tracks: wp.array(dtype=ToolTrack),
+    steps_done: wp.array(dtype=wp.int64),
+    wrench: wp.array2d(dtype=wp.vec3d),
+    impulse: wp.array2d(dtype=wp.vec3d),
+    work: wp.array(dtype=wp.float64),
+):
+    """Wrench of the sand on each tool now, its impulse over the frame, and the work of the tool on the sand since the start.
+
+    ``wrench`` and ``impulse`` have shape (tools, 2): force and torque about the tool frame's origin, world frame.
+    """
+    tools = wrench.shape[0]
+    pairs = pair_spans[pair_spans.shape[0] - 1]
+    number = (pairs + wp.static(SUM_BLOCK) - 1) // wp.static(SUM_BLOCK)
+    time = wp.float64(steps_done[0]) * dt
+    for tool in range(tools):
+        force = wp.vec3d(wp.float64(0.0))
+        torque = wp.vec3d(wp.float64(0.0))
+        for block in range(number):
+            force += blocks[block * tools + tool, 0]
+            torque += blocks[block * tools + tool, 1]
+        wrench[tool, 0] = force
+        wrench[tool, 1] = torque
+        impulse[tool, 0] = impulse[tool, 0] + force * dt
+        impulse[tool, 1] = impulse[tool, 1] + torque * dt
+        track = tracks[tool]
+        if time >= track.begin_time and time < track.end_time:
+            work[tool] = work[tool] - (wp.dot(force, track.velocity) + wp.dot(torque, track.spin)) * dt
+
+
+@kernel
+def finish_step(
+    steps_done: wp.array(dtype=wp.int64),
+    steps_left: wp.array(dtype=int),
+    fault: wp.array(dtype=int),
+    running: wp.array(dtype=int),
+):
+    """Count the step and decide whether the frame's loop goes on."""
+    steps_done[0] = steps_done[0] + wp.int64(1)
+    steps_left[0] = steps_left[0] - 1
+    if steps_left[0] <= 0 or fault[0] != 0:
+        running[0] = 0
+
+
+@kernel
+def lower_flag(flag: wp.array(dtype=int)):
+    """Set a flag to zero."""
+    flag[0] = 0
+
+
+@kernel
+def raise_flag(flag: wp.array(dtype=int)):
+    """Set a flag to one."""
+    flag[0] = 1
+
+
+@kernel
+def forget_travel(travelled: wp.array(dtype=wp.float64)):
+    """The tool list is new: no tool has moved since."""
+    for tool in range(travelled.shape[0]):
+        travelled[tool] = wp.float64(0.0)

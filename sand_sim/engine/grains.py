@@ -1,0 +1,101 @@
+"""The grains of a world as arrays on the device."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from sand_sim.engine.count import Count
+from sand_sim.engine.lattice import Lattice
+from sand_sim.engine.recipe import Recipe
+
+
+@dataclass(frozen=True)
+class GrainTable:
+    """Grains on the host, one row each, as the scene gives them or a snapshot keeps them.
+
+    Attributes:
+        position: world frame, shape (n, 3) [m].
+        velocity: shape (n, 3) [m/s].
+        spin: shape (n, 3) [rad/s], world frame.
+        radius: shape (n,) [m].
+        density: shape (n,) [kg/m^3].
+        material: index into the scene's materials, shape (n,), int.
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    radius: np.ndarray
+    density: np.ndarray
+    material: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Masses of solid spheres, shape (n,) [kg]."""
+        return self.density * 4.0 / 3.0 * np.pi * self.radius**3
+
+    @classmethod
+    def join(cls, tables: list["GrainTable"]) -> "GrainTable":
+        """One table after the other."""
+        return cls(*(np.concatenate([getattr(t, name) for t in tables]) for name in cls.__dataclass_fields__))
+
+
+class Grains:
+    """Grains on the device, renumbered at every neighbour search to stay in the order of their cells.
+
+    Attributes:
+        active: how many there are; retired grains lie behind the last.
+        place: lattice position and, last, radius, whole4, shape (n,) [quantum].
+        remainder: what the position is beyond whole quanta, vec3, shape (n,) [quantum].
+        motion: velocity [m/s] and, last, mass [kg], vec4, shape (n,).
+        spin: angular velocity [rad/s] and, last, moment of inertia [kg m^2], vec4, shape (n,); None without rotation.
+        material: shape (n,), int; None if all grains are of one material.
+        identity: number of the grain in the scene's table, shape (n,), int.
+        came_from: its number when the contact lists were made, shape (n,), int.
+        origin: place when the contact lists were made, whole4, shape (n,).
+        retired: grains that have left the domain so far, int, shape (1,).
+    """
+
+    def __init__(self, table: GrainTable, lattice: Lattice, recipe: Recipe, lanes: int, device: str):
+        self.lattice, self.recipe, self.device, self.capacity = lattice, recipe, device, len(table)
+        precision, number = recipe.precision, len(table)
+        self.active = Count(number, lanes, device)
+        self.place = wp.zeros(number, dtype=precision.whole4, device=device)
+        self.remainder = wp.zeros(number, dtype=precision.vec3, device=device)
+        self.motion = wp.zeros(number, dtype=precision.vec4, device=device)
+        self.spin = wp.zeros(number, dtype=precision.vec4, device=device) if recipe.rotation else None
+        self.material = wp.zeros(number, dtype=int, device=device) if recipe.materials else None
+        self.identity = wp.zeros(number, dtype=int, device=device)
+        self.came_from = wp.zeros(number, dtype=int, device=device)
+        self.origin = wp.zeros(number, dtype=precision.whole4, device=device)
+        self.retired = wp.zeros(1, dtype=int, device=device)
+        self.load(table)
+
+    @property
+    def sorted_arrays(self) -> list[wp.array]:
+        """All arrays that are renumbered together."""
+        arrays = [self.place, self.remainder, self.motion, self.spin, self.material, self.identity, self.came_from]
+        return [array for array in arrays if array is not None]
+
+    def load(self, table: GrainTable) -> None:
+        """Fill the arrays from a table of the same length."""
+        lattice, number = self.lattice, len(table)
+        precision = self.recipe.precision
+        radius = np.maximum(lattice.to_whole_length(table.radius), 1)
+        exact = (np.asarray(table.position, float) - lattice.centre) / lattice.quantum
+        self.place.assign(np.column_stack([lattice.to_lattice(table.position), radius]))
+        self.remainder.assign((exact - np.rint(exact)).astype(precision.numpy_real))
+        self.motion.assign(np.column_stack([table.velocity, table.mass]).astype(precision.numpy_real))
+        if self.spin is not None:
+            inertia = 0.4 * table.mass * table.radius**2
+            self.spin.assign(np.column_stack([table.spin, inertia]).astype(precision.numpy_real))
+        if self.material is not None:
+            self.material.assign(table.material)
+        self.identity.assign(np.arange(number))
+        self.came_from.assign(np.arange(number))
+        self.active.set(number)
+        self.retired.zero_()

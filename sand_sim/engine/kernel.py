@@ -1,0 +1,41 @@
+"""The one way kernels are declared, and Warp started: quietly, without backward passes, one small module for each kernel."""
+
+import os
+from functools import cache, partial
+
+import warp as wp
+
+
+def _start_warp() -> None:
+    """Start Warp without its greeting, and without the line it writes to stderr on every machine that has no NVIDIA driver."""
+    wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
+    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        wp.init()
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        os.close(nowhere)
+
+
+_start_warp()
+
+# Fused multiply-add makes the contact kernels a tenth faster; Warp's own flags leave it to the back end, which finds few.
+_OPTIONS = {"cpu_compiler_flags": f"{wp.config.cpu_compiler_flags} -ffp-contract=fast"}
+
+kernel = partial(wp.kernel, enable_backward=False, module="unique", module_options=_OPTIONS)
+
+
+@cache
+def _nothing(dtype: type, device: str) -> wp.array:
+    return wp.empty(1, dtype=dtype, device=device)
+
+
+def fill_gaps(launched: wp.Kernel, inputs: list, device: str) -> list:
+    """Put a dummy in the place of arrays that a scene left out (None).
+
+    Warp picks its fast path, with strides known when compiling, only if no array of a launch is null.
+    """
+    types = [argument.type for argument in launched.adj.args]
+    return [_nothing(t.dtype, device) if value is None else value for t, value in zip(types, inputs, strict=True)]

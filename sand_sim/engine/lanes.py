@@ -1,0 +1,163 @@
+"""Run recorded stages on all cores of a CPU.
+
+Warp runs a CPU launch on one thread but releases Python's lock meanwhile. So each core gets a lane: its own recorded graph of
+launches over its share of the items, replayed by its own thread without returning to Python. Lanes meet at a barrier after each
+stage. Every item is computed by the same code in the same order whatever the number of lanes, so the results are identical.
+"""
+
+import ctypes
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+
+import warp as wp
+
+from sand_sim.engine.count import Count
+from sand_sim.engine.kernel import fill_gaps, kernel
+
+_SPINS_BEFORE_YIELD = 2000
+_ABANDONED = 32
+_recording = threading.Lock()  # Warp records the launches of the whole process while a capture is open
+
+_BARRIER = """
+#if !defined(__CUDA_ARCH__)
+    wp::int32* arrived = meeting.data;
+    wp::int32* generation = meeting.data + 16;  // apart, each on a cache line of its own
+    wp::int32* abandoned = meeting.data + 32;
+    const wp::int32 mine = __atomic_load_n(generation, __ATOMIC_ACQUIRE);
+    if (__atomic_add_fetch(arrived, 1, __ATOMIC_ACQ_REL) == lanes) {
+        __atomic_store_n(arrived, 0, __ATOMIC_RELAXED);
+        __atomic_store_n(generation, mine + 1, __ATOMIC_RELEASE);
+        return;
+    }
+    wp::int32 spins = 0;
+    while (__atomic_load_n(generation, __ATOMIC_ACQUIRE) == mine && !__atomic_load_n(abandoned, __ATOMIC_RELAXED)) {
+        if (++spins > patience) ((wp::int32 (*)())give_way)();
+#if defined(__x86_64__)
+        else __builtin_ia32_pause();
+#elif defined(__aarch64__)
+        else __asm__ volatile("yield");
+#endif
+    }
+#endif
+"""
+
+
+@wp.func_native(_BARRIER)
+def _meet(meeting: wp.array(dtype=int), lanes: int, patience: int, give_way: wp.uint64): ...
+
+
+@kernel
+def meet(meeting: wp.array(dtype=int), lanes: int, patience: int, give_way: wp.uint64):
+    """Wait until all lanes have come here; spin for a while, then give the core to others."""
+    _meet(meeting, lanes, patience, give_way)
+
+
+def available_cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+class LaneRecorder:
+    """What a stage records itself on; this one keeps the share of one lane."""
+
+    def __init__(self, device: "CpuDevice", lane: int):
+        self._device, self._lane = device, lane
+        self.lanes = device.lanes
+
+    def each(self, launched: wp.Kernel, over: Count, inputs: list, wait: bool = True) -> None:
+        """Launch over all items of a population.
+
+        Args:
+            launched: kernel that takes ``(lane, spans, stride, *inputs)`` and loops over
+                ``range(spans[lane] + wp.tid(), spans[lane + 1], stride)``. Here one thread takes all items of the lane.
+            over: the population.
+            inputs: the kernel's further arguments.
+            wait: whether the lanes meet afterwards; False if the next stage touches nothing of this one.
+        """
+        if over.capacity:
+            self._launch(launched, 1, [self._lane, over.spans, 1, *inputs])
+        if wait:
+            self.wait()
+
+    def share(self, launched: wp.Kernel, inputs: list, wait: bool = True) -> None:
+        """Launch one thread a lane; the kernel takes ``(lane, lanes, *inputs)`` and finds its own share."""
+        self._launch(launched, 1, [self._lane, self.lanes, *inputs])
+        if wait:
+            self.wait()
+
+    def once(self, launched: wp.Kernel, inputs: list, wait: bool = True) -> None:
+        """Launch a single thread on the first lane."""
+        if self._lane == 0:
+            self._launch(launched, 1, inputs)
+        if wait:
+            self.wait()
+
+    def when(self, flag: wp.array, body: Callable[[], None]) -> None:
+        """Run the body's launches only if ``flag[0]`` is not zero then."""
+        wp.capture_if(flag, on_true=body)
+
+    def repeat(self, flag: wp.array, body: Callable[[], None]) -> None:
+        """Run the body's launches as long as ``flag[0]`` is not zero."""
+        wp.capture_while(flag, body)
+
+    def wait(self) -> None:
+        """Let all lanes meet."""
+        if self.lanes > 1:
+            self._launch(meet, 1, self._device.meeting_arguments)
+
+    def _launch(self, launched: wp.Kernel, size: int, inputs: list) -> None:
+        wp.launch(launched, dim=size, inputs=fill_gaps(launched, inputs, "cpu"), device="cpu")
+
+
+class CpuDevice:
+    """All cores of this machine as one device."""
+
+    name = "cpu"
+
+    def __init__(self, threads: int | None = None):
+        self.lanes = threads or available_cores()
+        give_way = ctypes.cast(ctypes.CDLL(None).sched_yield, ctypes.c_void_p).value
+        self._meeting = wp.zeros(48, dtype=int, device="cpu")
+        self.meeting_arguments = [self._meeting, self.lanes, _SPINS_BEFORE_YIELD, wp.uint64(give_way)]
+        self._threads = ThreadPoolExecutor(self.lanes, thread_name_prefix="sand_sim lane")
+
+    def record(self, program: Callable[[LaneRecorder], None]) -> Callable[[], None]:
+        """Record a program once per lane.
+
+        Args:
+            program: launches its stages on the recorder it is given; it must launch the same stages whatever the lane.
+
+        Returns:
+            A function that runs the recorded program on all lanes and returns when it is done.
+        """
+        graphs = []
+        for lane in range(self.lanes):
+            with _recording, wp.ScopedCapture(device="cpu") as capture:
+                program(LaneRecorder(self, lane))
+            graphs.append(capture.graph)
+        return lambda: self._run(graphs)
+
+    def synchronize(self) -> None:
+        """Nothing is pending on a CPU once ``record``'s function has returned."""
+
+    def _run(self, graphs: list) -> None:
+        running = []
+        try:
+            for graph in graphs:
+                running.append(self._threads.submit(wp.capture_launch, graph))
+            finished, _ = wait(running, return_when=FIRST_EXCEPTION)
+            for lane in finished:
+                lane.result()
+        except BaseException:
+            # A lane that failed or never started would leave the others waiting for ever.
+            if len(running) < self.lanes or any(lane.done() and lane.exception() for lane in running):
+                self._meeting.numpy()[_ABANDONED] = 1
+            wait(running)
+            self._meeting.zero_()
+            raise
+
+    def close(self) -> None:
+        """End the threads."""
+        self._threads.shutdown()

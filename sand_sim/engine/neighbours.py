@@ -1,0 +1,140 @@
+"""Neighbour search: spheres kept in the order of their cells, and each pair within reach listed once."""
+
+from functools import cache
+
+import warp as wp
+
+from sand_sim.engine.cells import cell_functions, level_type
+from sand_sim.engine.contact_list import listed_at
+from sand_sim.engine.count import share_out
+from sand_sim.engine.kernel import kernel
+from sand_sim.engine.recipe import Recipe
+
+
+@cache
+def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
+    """Kernel that visits each pair of spheres closer than touch plus skin, once, from the sphere that comes first.
+
+    Spheres are numbered in the order of their cells, level by level from fine to coarse. A sphere looks at what follows in its
+    own level and at all cells around it in coarser levels. The first pass counts, the second (``filling``) writes the list.
+    """
+    precision, history = recipe.precision, recipe.history
+    real, vec3, whole3, whole4 = precision.real, precision.vec3, precision.whole3, precision.whole4
+    level = level_type(precision)
+    level_of, cell_of = cell_functions(precision)
+
+    @kernel
+    def search(
+        lane: int,
+        spans: wp.array(dtype=int),
+        stride: int,
+        place: wp.array(dtype=whole4),
+        levels: wp.array(dtype=level),
+        lowest: wp.array(dtype=whole3),
+        cell_starts: wp.array(dtype=int),
+        skin: real,
+        counts: wp.array(dtype=int),
+        starts: wp.array(dtype=int),
+        owner: wp.array(dtype=int),
+        partner: wp.array(dtype=int),
+        spring: wp.array(dtype=vec3),
+        came_from: wp.array(dtype=int),
+        old_starts: wp.array(dtype=int),
+        old_partner: wp.array(dtype=int),
+        old_spring: wp.array(dtype=vec3),
+    ):
+        for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            here = place[i]
+            low = lowest[0]
+            found = int(0)
+            if wp.static(filling):
+                found = starts[i]
+            own = level_of(levels, here[3])
+            for k in range(own, levels.shape[0]):
+                one = levels[k]
+                cell = cell_of(one, low, here)
+                left = wp.max(cell[0] - 1, 0)
+                right = wp.min(cell[0] + 1, one.nx - 1)
+                for row in range(9):
+                    y = cell[1] + row % 3 - 1
+                    z = cell[2] + row // 3 - 1
+                    behind = k == own and row < 4
+                    if behind or y < 0 or y >= one.ny or z < 0 or z >= one.nz:
+                        continue
+                    line = one.first_key + (z * one.ny + y) * one.nx
+                    first = cell_starts[line + left]
+                    if k == own and row == 4:
+                        first = i + 1
+                    for j in range(first, cell_starts[line + right + 1]):
+                        there = place[j]
+                        dx = real(here[0] - there[0])
+                        dy = real(here[1] - there[1])
+                        dz = real(here[2] - there[2])
+                        reach = real(here[3] + there[3]) + skin
+                        if dx * dx + dy * dy + dz * dz < reach * reach:
+                            if wp.static(filling):
+                                owner[found] = i
+                                partner[found] = j
+                                if wp.static(history):
+                                    kept = vec3(real(0.0))
+                                    old = listed_at(old_starts, old_partner, came_from[i], came_from[j])
+                                    if old >= 0:
+                                        kept = old_spring[old]
+                                    else:
+                                        old = listed_at(old_starts, old_partner, came_from[j], came_from[i])
+                                        if old >= 0:
+                                            kept = -old_spring[old]
+                                    spring[found] = kept
+                            found += 1
+            if wp.static(not filling):
+                counts[i] = found
+
+    return search
+
+
+@cache
+def build_take_in_order(dtype: type) -> wp.Kernel:
+    """Kernel ``taken[i] = values[order[i]]``."""
+
+    @kernel
+    def take_in_order(
+        lane: int,
+        spans: wp.array(dtype=int),
+        stride: int,
+        order: wp.array(dtype=int),
+        values: wp.array(dtype=dtype),
+        taken: wp.array(dtype=dtype),
+    ):
+        for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            taken[i] = values[order[i]]
+
+    return take_in_order
+
+
+@cache
+def build_put_back(dtype: type) -> wp.Kernel:
+    """Kernel ``values[i] = taken[i]``."""
+
+    @kernel
+    def put_back(lane: int, spans: wp.array(dtype=int), stride: int, taken: wp.array(dtype=dtype), values: wp.array(dtype=dtype)):
+        for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            values[i] = taken[i]
+
+    return put_back
+
+
+@kernel
+def count_active(
+    cell_starts: wp.array(dtype=int), bins: wp.array(dtype=int), spans: wp.array(dtype=int), retired: wp.array(dtype=int)
+):
+    """Grains sorted behind the last cell have retired."""
+    active = cell_starts[bins[0] - 1]
+    retired[0] = retired[0] + spans[spans.shape[0] - 1] - active
+    share_out(spans, active)
+
+
+@kernel
+def number_anew(lane: int, spans: wp.array(dtype=int), stride: int, came_from: wp.array(dtype=int)):
+    """The lists now speak of the present numbering."""
+    for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+        came_from[i] = i

@@ -1,0 +1,31 @@
+"""What a scene needs from the kernels. Choices here are static: another choice is another kernel, compiled without the rest."""
+
+from dataclasses import dataclass, field
+
+from sand_sim.contact.response import ContactModel
+from sand_sim.engine.precision import SINGLE, Precision
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Static choices of a world.
+
+    Attributes:
+        contact: one law per slot.
+        precision: number types.
+        materials: grains are of more than one material.
+    """
+
+    contact: ContactModel = field(default_factory=ContactModel)
+    precision: Precision = SINGLE
+    materials: bool = False
+
+    @property
+    def rotation(self) -> bool:
+        """Whether grains turn."""
+        return self.contact.rotation
+
+    @property
+    def history(self) -> bool:
+        """Whether contacts remember."""
+        return self.contact.history

@@ -1,0 +1,298 @@
+"""The stages of explicit DEM: what each launches, in which order. This file knows no physics, only who needs which arrays."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import warp as wp
+
+from sand_sim.engine import energy, finish, motion, neighbours, pair_forces, surfaces, tool_contacts
+from sand_sim.engine.arrays import DemArrays
+from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_lay_cells
+from sand_sim.engine.contact_list import ContactList, record_count, record_fill
+from sand_sim.engine.sorting import record_sort
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A named part of a step.
+
+    Attributes:
+        name: shown in plans and profiles.
+        record: ``record(arrays, recorder)`` launches the stage on a recorder.
+    """
+
+    name: str
+    record: Callable
+
+
+@dataclass(frozen=True)
+class Stages:
+    """The stages that a scene needs.
+
+    Attributes:
+        listing: when a grain has moved half the skin.
+        tool_listing: when a tool has.
+        step: at every step.
+    """
+
+    listing: tuple[Stage, ...]
+    tool_listing: tuple[Stage, ...]
+    step: tuple[Stage, ...]
+
+
+def choose_stages(arrays: DemArrays) -> Stages:
+    """Keep the stages that the scene's arrays call for."""
+    step = [Stage("pair forces", pair_stage)]
+    if arrays.walls:
+        step.append(Stage("wall forces", wall_stage))
+    if arrays.tools:
+        step.append(Stage("tool forces", tool_stage))
+    step += [Stage("move grains", move_stage), Stage("finish step", finish_stage)]
+    return Stages(
+        listing=(Stage("sort grains", sort_stage), Stage("list contacts", list_stage)),
+        tool_listing=(Stage("list tool contacts", tool_list_stage),) if arrays.tools else (),
+        step=tuple(step),
+    )
+
+
+def record_lists(arrays: DemArrays, stages: Stages, recorder) -> None:
+    """Record the renewal of the lists that are no longer valid."""
+    recorder.when(arrays.flags.grains_moved, partial(_play, arrays, stages.listing, recorder))
+    if stages.tool_listing:
+        recorder.when(arrays.flags.tools_moved, partial(_play, arrays, stages.tool_listing, recorder))
+
+
+def record_run(arrays: DemArrays, stages: Stages, recorder) -> None:
+    """Record the loop over steps: renew the lists where needed, then step, until ``flags.running`` falls."""
+
+    def one_step():
+        record_lists(arrays, stages, recorder)
+        recorder.when(arrays.flags.proceed, partial(_play, arrays, stages.step, recorder))
+
+    if arrays.tools:
+        place_tools(arrays, recorder)
+    recorder.repeat(arrays.flags.running, one_step)
+
+
+def record_renewal(arrays: DemArrays, stages: Stages, recorder) -> None:
+    """Record the renewal of the lists alone."""
+    if arrays.tools:
+        place_tools(arrays, recorder)
+    record_lists(arrays, stages, recorder)
+
+
+def record_measurement(arrays: DemArrays, stages: Stages, recorder) -> None:
+    """Record the sums from which energies, top speed and touching contacts are read."""
+    grains, setting = arrays.grains, arrays.setting
+    recorder.share(
+        energy.build_grain_energy(arrays.recipe),
+        [
+            grains.active.spans,
+            grains.place,
+            grains.motion,
+            grains.spin,
+            arrays.recipe.precision.vec3(*setting.gravity),
+            arrays.lattice.quantum,
+            arrays.grain_blocks,
+            arrays.fastest,
+        ],
+    )
+    pair_stage(arrays, recorder, measuring=True)
+    if arrays.walls:
+        wall_stage(arrays, recorder, measuring=True)
+    if arrays.tools:
+        tool_stage(arrays, recorder, measuring=True)
+    recorder.wait()
+    for name, contacts in arrays.lists.items():
+        inputs = [contacts.pairs.spans, arrays.energy[name], arrays.energy_blocks[name]]
+        recorder.share(energy.build_contact_energy(arrays.recipe.precision), inputs)
+
+
+def sort_stage(arrays: DemArrays, recorder) -> None:
+    """Renumber the grains in the order of their cells; those that have left fall off the end."""
+    grains, cells, precision = arrays.grains, arrays.cells, arrays.recipe.precision
+    active = grains.active
+    recorder.share(build_find_corners(precision), [active.spans, grains.place, cells.corners])
+    recorder.once(build_lay_cells(precision), [cells.corners, cells.levels, cells.low, cells.bins, cells.room])
+    recorder.each(build_cell_keys(precision), active, [grains.place, cells.levels, cells.low, cells.bins, arrays.keys])
+    record_sort(recorder, arrays.keys, cells.bins, active, arrays.in_cells)
+    for array in grains.sorted_arrays:
+        spare = arrays.spare[array.dtype]
+        recorder.each(neighbours.build_take_in_order(array.dtype), active, [arrays.in_cells.order, array, spare])
+        recorder.each(neighbours.build_put_back(array.dtype), active, [spare, array])
+    recorder.once(neighbours.count_active, [arrays.in_cells.starts, cells.bins, active.spans, grains.retired])
+
+
+def list_stage(arrays: DemArrays, recorder) -> None:
+    """Find what each grain may touch among grains and walls; count first, so that nothing is written unless all of it fits."""
+    grains, flags, cells = arrays.grains, arrays.flags, arrays.cells
+    active, skin, quantum = grains.active, arrays.setting.skin, arrays.lattice.quantum
+
+    def pairs(filling):
+        inputs = [grains.place, cells.levels, cells.low, arrays.in_cells.starts, skin / quantum]
+        inputs += _list_arguments(arrays, arrays.pair_list)
+        recorder.each(neighbours.build_search(arrays.recipe, filling), active, inputs)
+
+    def walls(filling):
+        inputs = [grains.place, arrays.walls, quantum, skin, *_list_arguments(arrays, arrays.wall_list)]
+        recorder.each(surfaces.build_surface_search(arrays.recipe, filling), active, inputs)
+
+    def fill():
+        record_fill(recorder, arrays.pair_list, arrays.every_start, partial(pairs, True))
+        record_sort(recorder, arrays.pair_list.partner, active.spans, arrays.pair_list.pairs, arrays.met)
+        if arrays.walls:
+            record_fill(recorder, arrays.wall_list, arrays.every_start, partial(walls, True))
+        if arrays.tools:
+            recorder.once(finish.raise_flag, [flags.tools_moved])
+        else:
+            recorder.each(neighbours.number_anew, active, [grains.came_from])
+        recorder.each(neighbours.build_put_back(grains.place.dtype), active, [grains.place, grains.origin])
+        recorder.once(finish.lower_flag, [flags.grains_moved])
+
+    record_count(recorder, arrays.pair_list, active, partial(pairs, False), flags)
+    if arrays.walls:
+        record_count(recorder, arrays.wall_list, active, partial(walls, False), flags)
+    recorder.when(flags.proceed, fill)
+
+
+def tool_list_stage(arrays: DemArrays, recorder) -> None:
+    """Find what each grain may touch among tool particles."""
+    grains, tools, flags = arrays.grains, arrays.tools, arrays.flags
+
+    def search(filling):
+        inputs = [grains.origin, tools.shapes, tools.states, tools.cell_starts, tools.particles]
+        inputs += [arrays.lattice.quantum, arrays.setting.skin, *_list_arguments(arrays, arrays.tool_list)]
+        recorder.each(tool_contacts.build_tool_search(arrays.recipe, filling), grains.active, inputs)
+
+    def fill():
+        record_fill(recorder, arrays.tool_list, arrays.every_start, partial(search, True))
+        recorder.each(neighbours.number_anew, grains.active, [grains.came_from])
+        recorder.once(finish.forget_travel, [tools.travelled], wait=False)
+        recorder.once(finish.lower_flag, [flags.tools_moved])
+
+    record_count(recorder, arrays.tool_list, grains.active, partial(search, False), flags)
+    recorder.when(flags.proceed, fill)
+
+
+def pair_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
+    """Forces between grains."""
+    contacts = arrays.pair_list
+    inputs = [*_grain_arguments(arrays, contacts), *_act_arguments(arrays, "pair")]
+    last = not (arrays.walls or arrays.tools)
+    recorder.each(pair_forces.build_pair_forces(arrays.recipe, measuring), contacts.pairs, inputs, wait=last)
+
+
+def wall_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
+    """Forces of walls on grains."""
+    contacts = arrays.wall_list
+    inputs = [*_grain_arguments(arrays, contacts), arrays.walls, *_act_arguments(arrays, "wall")]
+    recorder.each(surfaces.build_surface_forces(arrays.recipe, measuring), contacts.pairs, inputs, wait=not arrays.tools)
+
+
+def tool_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
+    """Forces of tools on grains, and their sums over blocks of contacts."""
+    contacts, tools = arrays.tool_list, arrays.tools
+    inputs = [*_grain_arguments(arrays, contacts), tools.shapes, tools.states, tools.particles, tools.tool_of]
+    inputs += [arrays.lever, *_act_arguments(arrays, "tool")]
+    recorder.each(tool_contacts.build_tool_forces(arrays.recipe, measuring), contacts.pairs, inputs)
+    if not measuring:
+        sums = [contacts.pairs.spans, contacts.partner, tools.tool_of, contacts.force, arrays.lever, tools.number]
+        blocks = tool_contacts.build_wrench_blocks(arrays.recipe)
+        recorder.share(blocks, [*sums, arrays.wrench_blocks], wait=False)
+
+
+def move_stage(arrays: DemArrays, recorder) -> None:
+    """Advance all grains."""
+    grains, lattice, setting, precision = arrays.grains, arrays.lattice, arrays.setting, arrays.recipe.precision
+    gathered = [
+        [c.starts, c.force, c.couple] if c else [None, None, None] for c in (arrays.pair_list, arrays.wall_list, arrays.tool_list)
+    ]
+    recorder.each(
+        motion.build_move_grains(arrays.recipe, walls=bool(arrays.walls), tools=bool(arrays.tools)),
+        grains.active,
+        [
+            grains.place,
+            grains.remainder,
+            grains.motion,
+            grains.spin,
+            grains.origin,
+            *gathered[0],
+            arrays.met.starts,
+            arrays.met.order,
+            *gathered[1],
+            *gathered[2],
+            precision.vec3(*setting.gravity),
+            setting.dt,
+            lattice.quantum,
+            precision.whole3(*lattice.half_extent.tolist()),
+            lattice.end,
+            0.5 * setting.skin / lattice.quantum,
+            arrays.flags.grains_moved,
+            arrays.flags.fault,
+        ],
+    )
+
+
+def finish_stage(arrays: DemArrays, recorder) -> None:
+    """Sum the wrenches, count the step, move the tools on."""
+    flags, tools, dt = arrays.flags, arrays.tools, arrays.setting.dt
+    if tools:
+        inputs = [arrays.tool_list.pairs.spans, arrays.wrench_blocks, dt, tools.tracks, flags.steps_done]
+        recorder.once(finish.sum_wrenches, [*inputs, tools.wrench, tools.impulse, tools.work], wait=False)
+    ending = [flags.steps_done, flags.steps_left, flags.fault, flags.running]
+    recorder.once(finish.finish_step, ending, wait=not tools)
+    if tools:
+        place_tools(arrays, recorder)
+
+
+def place_tools(arrays: DemArrays, recorder) -> None:
+    """Put the tools where their tracks have them at the present step."""
+    tools, lattice, setting = arrays.tools, arrays.lattice, arrays.setting
+    recorder.once(
+        finish.build_place_tools(arrays.recipe.precision),
+        [
+            tools.tracks,
+            tools.shapes,
+            tools.states,
+            wp.vec3d(*lattice.centre),
+            1.0 / lattice.quantum,
+            float(lattice.end),
+            setting.dt,
+            arrays.flags.steps_done,
+            tools.travelled,
+            0.5 * setting.skin,
+            arrays.flags.tools_moved,
+        ],
+    )
+
+
+def _play(arrays: DemArrays, stages: tuple[Stage, ...], recorder) -> None:
+    for stage in stages:
+        stage.record(arrays, recorder)
+
+
+def _list_arguments(arrays: DemArrays, contacts: ContactList) -> list:
+    written = [contacts.counts, contacts.starts, contacts.owner, contacts.partner, contacts.spring]
+    return [*written, arrays.grains.came_from, contacts.old_starts, contacts.old_partner, contacts.force]
+
+
+def _grain_arguments(arrays: DemArrays, contacts: ContactList) -> list:
+    grains = arrays.grains
+    return [
+        contacts.owner,
+        contacts.partner,
+        grains.place,
+        grains.motion,
+        grains.spin,
+        grains.material,
+        arrays.pairs,
+        arrays.kinds,
+        arrays.lattice.quantum,
+        arrays.setting.dt,
+    ]
+
+
+def _act_arguments(arrays: DemArrays, name: str) -> list:
+    contacts = arrays.lists[name]
+    return [contacts.spring, contacts.force, contacts.couple, arrays.deepest, arrays.energy[name]]

@@ -1,0 +1,75 @@
+"""The whole state of a world as plain arrays: put back, it goes on to the bit as if nothing had happened."""
+
+import numpy as np
+import warp as wp
+
+from sand_sim.engine.arrays import DemArrays
+from sand_sim.engine.count import Count
+
+
+def take_state(arrays: DemArrays) -> dict[str, np.ndarray]:
+    """Copy everything that the next step depends on, and what has been summed up so far, to the host."""
+    state = {name: array.numpy().copy() for name, array in _whole_arrays(arrays).items()}
+    state |= {f"{name}.number": np.array(count.get()) for name, count in _counts(arrays).items()}
+    for name, (array, count) in _filled_arrays(arrays).items():
+        state[name] = array.numpy()[: count.get()].copy()
+    state["deepest"] = arrays.deepest.numpy().max(keepdims=True)
+    return state
+
+
+def put_state(arrays: DemArrays, state: dict[str, np.ndarray]) -> bool:
+    """Put a state of the same scene back.
+
+    Args:
+        arrays: of a world made from the same scene, on any number of lanes.
+        state: from ``take_state``.
+
+    Returns:
+        Whether lists had to be enlarged, so that programs must be recorded anew.
+    """
+    grown = False
+    for name, contacts in arrays.lists.items():
+        number = int(state[f"{name}.number"])
+        if number > contacts.pairs.capacity:
+            contacts.wanted.fill_(number)
+            grown = True
+    if grown:
+        arrays.make_room()
+    for name, count in _counts(arrays).items():
+        count.set(int(state[f"{name}.number"]))
+    for name, array in _whole_arrays(arrays).items():
+        array.assign(state[name])
+    for name, (array, _) in _filled_arrays(arrays).items():
+        if len(state[name]):
+            wp.copy(array, wp.array(state[name], dtype=array.dtype, device=arrays.device), count=len(state[name]))
+    arrays.deepest.zero_()
+    wp.copy(arrays.deepest, wp.array(state["deepest"], dtype=arrays.deepest.dtype, device=arrays.device), count=1)
+    return grown
+
+
+def _counts(arrays: DemArrays) -> dict[str, Count]:
+    return {"grains": arrays.grains.active} | {name: contacts.pairs for name, contacts in arrays.lists.items()}
+
+
+def _whole_arrays(arrays: DemArrays) -> dict[str, wp.array]:
+    """Arrays whose length does not change."""
+    grains, flags, tools = arrays.grains, arrays.flags, arrays.tools
+    names = ("place", "remainder", "motion", "spin", "material", "identity", "came_from", "origin", "retired")
+    found = {f"grains.{name}": getattr(grains, name) for name in names}
+    found |= {f"flags.{name}": getattr(flags, name) for name in ("grains_moved", "tools_moved", "steps_done")}
+    found |= {f"{name}.starts": contacts.starts for name, contacts in arrays.lists.items()}
+    found["met.starts"] = arrays.met.starts
+    if tools:
+        names = ("tracks", "states", "travelled", "wrench", "impulse", "work")
+        found |= {f"tools.{name}": getattr(tools, name) for name in names}
+    return {name: array for name, array in found.items() if array is not None}
+
+
+def _filled_arrays(arrays: DemArrays) -> dict[str, tuple[wp.array, Count]]:
+    """Arrays of which only the first items mean something."""
+    found = {"met.order": (arrays.met.order, arrays.pair_list.pairs)}
+    for name, contacts in arrays.lists.items():
+        for part in ("owner", "partner", "spring"):
+            if getattr(contacts, part) is not None:
+                found[f"{name}.{part}"] = (getattr(contacts, part), contacts.pairs)
+    return found

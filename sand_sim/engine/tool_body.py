@@ -1,0 +1,78 @@
+"""Tools on the device: their particles, fixed in their own frames, and the cells these lie in."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from sand_sim.engine.precision import Precision
+from sand_sim.engine.tools import ToolTrack, tool_types
+
+
+@dataclass(frozen=True)
+class ToolBody:
+    """A tool as the solver sees it.
+
+    Attributes:
+        particles: centres in the tool frame, shape (n, 3) [m].
+        radius: of every particle [m].
+        material: index into the scene's materials.
+    """
+
+    particles: np.ndarray
+    radius: float
+    material: int
+
+
+class Tools:
+    """All driven tools of a world.
+
+    Attributes:
+        number: how many.
+        particles: centres in their tool's frame, vec3, shape (particles,) [m].
+        tool_of: tool of each particle, int, shape (particles,).
+        cell_starts: particles of cell k are ``cell_starts[k]`` to ``cell_starts[k + 1]``, int.
+        shapes, states, tracks: structs of ``tools.py``, shape (tools,).
+        travelled: bound of each tool's motion since the list was made, shape (tools,) [m].
+        wrench, impulse: force and torque of the sand now, and over the frame, vec3d, shape (tools, 2).
+        work: of the tool on the sand since the start, shape (tools,) [J].
+    """
+
+    def __init__(self, bodies: list[ToolBody], reach: float, precision: Precision, device: str):
+        shape_type, state_type = tool_types(precision)
+        self.number = len(bodies)
+        shapes, particles, starts, tool_of = [], [], [0], []
+        for index, body in enumerate(bodies):
+            shape = shape_type()
+            points = np.asarray(body.particles, float)
+            cell = (body.radius + reach) * 1.001
+            low = points.min(axis=0) - 0.01 * cell
+            counts = np.floor((points.max(axis=0) - low) / cell).astype(int) + 1
+            cells = np.minimum(((points - low) / cell).astype(int), counts - 1)
+            keys = (cells[:, 2] * counts[1] + cells[:, 1]) * counts[0] + cells[:, 0]
+            order = np.argsort(keys, kind="stable")
+            shape.radius = body.radius
+            shape.extent = float(np.linalg.norm(points, axis=1).max() + body.radius)
+            shape.material = body.material
+            shape.low = precision.vec3(*low)
+            shape.inverse_cell = 1.0 / cell
+            shape.nx, shape.ny, shape.nz = (int(c) for c in counts)
+            shape.first_key = len(starts) - 1
+            shapes.append(shape)
+            particles.append(points[order])
+            tool_of.append(np.full(len(points), index))
+            starts += list(starts[-1] + np.cumsum(np.bincount(keys, minlength=int(np.prod(counts)))))
+        self.particles = wp.array(np.concatenate(particles), dtype=precision.vec3, device=device)
+        self.tool_of = wp.array(np.concatenate(tool_of), dtype=int, device=device)
+        self.cell_starts = wp.array(starts, dtype=int, device=device)
+        self.shapes = wp.array(shapes, dtype=shape_type, device=device)
+        self.states = wp.zeros(self.number, dtype=state_type, device=device)
+        self.tracks = wp.zeros(self.number, dtype=ToolTrack, device=device)
+        self.travelled = wp.zeros(self.number, dtype=wp.float64, device=device)
+        self.wrench = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
+        self.impulse = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
+        self.work = wp.zeros(self.number, dtype=wp.float64, device=device)
+
+    def set_tracks(self, tracks: list) -> None:
+        """Give all tools their tracks (``tools.ToolTrack``)."""
+        self.tracks.assign(wp.array(tracks, dtype=ToolTrack, device="cpu"))

@@ -1,0 +1,234 @@
+"""Contacts of grains with the particles of tools.
+
+The particles of a tool lie still in the tool's frame, so their cells are laid once. A grain is brought into that frame to find
+the particles near it, and moving a tool rebuilds no list but this one.
+"""
+
+from functools import cache
+
+import warp as wp
+
+from sand_sim.contact.contact import contact_types
+from sand_sim.contact.response import build_meeting
+from sand_sim.engine.act import build_act
+from sand_sim.engine.contact_list import listed_at
+from sand_sim.engine.kernel import kernel
+from sand_sim.engine.pair_forces import build_gap
+from sand_sim.engine.precision import Precision
+from sand_sim.engine.recipe import Recipe
+from sand_sim.engine.tools import tool_types
+
+SUM_BLOCK = 128  # contacts per partial sum of a wrench; fixed, so that the sum does not depend on the number of lanes
+
+
+@cache
+def build_from_tool(precision: Precision) -> wp.Function:
+    """Warp function: vector from a tool frame's origin to a grain's centre, world frame [m]."""
+    real, vec3, whole4 = precision.real, precision.vec3, precision.whole4
+    _, state_type = tool_types(precision)
+
+    @wp.func
+    def from_tool(here: whole4, state: state_type, quantum: real) -> vec3:
+        at = state.place
+        return vec3(real(here[0] - at[0]), real(here[1] - at[1]), real(here[2] - at[2])) * quantum
+
+    return from_tool
+
+
+@cache
+def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
+    """Kernel that counts or, ``filling``, lists the tool particles within reach of each grain.
+
+    Grains are taken where they were when the grain list was made (``origin``): what they may have moved since is in the skin.
+    """
+    precision, history = recipe.precision, recipe.history
+    real, vec3, whole4 = precision.real, precision.vec3, precision.whole4
+    shape_type, state_type = tool_types(precision)
+    from_tool = build_from_tool(precision)
+
+    @kernel
+    def tool_search(
+        lane: int,
+        spans: wp.array(dtype=int),
+        stride: int,
+        origin: wp.array(dtype=whole4),
+        shapes: wp.array(dtype=shape_type),
+        states: wp.array(dtype=state_type),
+        cell_starts: wp.array(dtype=int),
+        particles: wp.array(dtype=vec3),
+        quantum: real,
+        skin: real,
+        counts: wp.array(dtype=int),
+        starts: wp.array(dtype=int),
+        owner: wp.array(dtype=int),
+        partner: wp.array(dtype=int),
+        spring: wp.array(dtype=vec3),
+        came_from: wp.array(dtype=int),
+        old_starts: wp.array(dtype=int),
+        old_partner: wp.array(dtype=int),
+        old_spring: wp.array(dtype=vec3),
+    ):
+        for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            here = origin[i]
+            found = int(0)
+            if wp.static(filling):
+                found = starts[i]
+            for tool in range(shapes.shape[0]):
+                shape = shapes[tool]
+                state = states[tool]
+                away = from_tool(here, state, quantum)
+                reach = real(here[3]) * quantum + shape.radius + skin
+                farthest = shape.extent + reach
+                if wp.dot(away, away) > farthest * farthest:
+                    continue
+                local = wp.quat_rotate_inv(state.rotation, away)
+                cell = (local - shape.low) * shape.inverse_cell
+                x = int(wp.floor(cell[0]))
+                y = int(wp.floor(cell[1]))
+                z = int(wp.floor(cell[2]))
+                left = wp.max(x - 1, 0)
+                right = wp.min(x + 1, shape.nx - 1)
+                if left > right:
+                    continue
+                for row in range(9):
+                    v = y + row % 3 - 1
+                    w = z + row // 3 - 1
+                    if v < 0 or v >= shape.ny or w < 0 or w >= shape.nz:
+                        continue
+                    line = shape.first_key + (w * shape.ny + v) * shape.nx
+                    for j in range(cell_starts[line + left], cell_starts[line + right + 1]):
+                        apart = local - particles[j]
+                        if wp.dot(apart, apart) < reach * reach:
+                            if wp.static(filling):
+                                owner[found] = i
+                                partner[found] = j
+                                if wp.static(history):
+                                    kept = vec3(real(0.0))
+                                    old = listed_at(old_starts, old_partner, came_from[i], j)
+                                    if old >= 0:
+                                        kept = old_spring[old]
+                                    spring[found] = kept
+                            found += 1
+            if wp.static(not filling):
+                counts[i] = found
+
+    return tool_search
+
+
+@cache
+def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
+    """Kernel for the forces between grains and tool particles; the tool is immovable for the law (m* is the grain's mass)."""
+    precision, rotation, materials = recipe.precision, recipe.rotation, recipe.materials
+    real, vec3, vec4, whole4 = precision.real, precision.vec3, precision.vec4, precision.whole4
+    types, (shape_type, state_type) = contact_types(precision), tool_types(precision)
+    from_tool, gap = build_from_tool(precision), build_gap(precision)
+    meeting = build_meeting(precision)
+    act, release = build_act(recipe, measuring)
+
+    @kernel
+    def tool_forces(
+        lane: int,
+        spans: wp.array(dtype=int),
+        stride: int,
+        owner: wp.array(dtype=int),
+        partner: wp.array(dtype=int),
+        place: wp.array(dtype=whole4),
+        motion: wp.array(dtype=vec4),
+        spin: wp.array(dtype=vec4),
+        material: wp.array(dtype=int),
+        table: wp.array(dtype=types.pair),
+        kinds: int,
+        quantum: real,
+        dt: real,
+        shapes: wp.array(dtype=shape_type),
+        states: wp.array(dtype=state_type),
+        particles: wp.array(dtype=vec3),
+        tool_of: wp.array(dtype=int),
+        lever: wp.array(dtype=vec3),
+        spring: wp.array(dtype=vec3),
+        force: wp.array(dtype=vec3),
+        couple: wp.array(dtype=vec4),
+        deepest: wp.array(dtype=real),
+        energy: wp.array(dtype=real),
+    ):
+        for contact in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            i = owner[contact]
+            j = partner[contact]
+            tool = tool_of[j]
+            state = states[tool]
+            shape = shapes[tool]
+            here = place[i]
+            arm = wp.quat_rotate(state.rotation, particles[j])
+            apart = from_tool(here, state, quantum) - arm
+            radius = real(here[3]) * quantum
+            reach = radius + shape.radius
+            if wp.dot(apart, apart) < reach * reach:
+                normal, overlap = gap(apart, reach)
+                half = real(0.5) * overlap
+                point = arm + normal * (shape.radius - half)
+                of_i = motion[i]
+                velocity = vec3(of_i[0], of_i[1], of_i[2]) - state.velocity - wp.cross(state.spin, point)
+                if wp.static(rotation):
+                    turning = spin[i]
+                    velocity -= wp.cross(vec3(turning[0], turning[1], turning[2]), normal) * (radius - half)
+                met = meeting(normal, overlap, velocity, radius * shape.radius / reach, of_i[3])
+                kind = int(0)
+                if wp.static(materials):
+                    kind = material[i]
+                lever[contact] = point
+                act(
+                    contact,
+                    met,
+                    table[kind * kinds + shape.material],
+                    dt,
+                    half,
+                    lane,
+                    overlap / radius,
+                    spring,
+                    force,
+                    couple,
+                    deepest,
+                    energy,
+                )
+            else:
+                lever[contact] = vec3(real(0.0))
+                release(contact, spring, force, couple, energy)
+
+    return tool_forces
+
+
+@cache
+def build_wrench_blocks(recipe: Recipe) -> wp.Kernel:
+    """Kernel that sums force and torque of the sand on each tool over blocks of contacts: thread = block * tools + tool.
+
+    ``blocks`` has shape (blocks * tools, 2): force [N] and torque [N m] about the tool frame's origin, world frame.
+    """
+    vec3 = recipe.precision.vec3
+
+    @kernel
+    def wrench_blocks(
+        lane: int,
+        lanes: int,
+        pair_spans: wp.array(dtype=int),
+        partner: wp.array(dtype=int),
+        tool_of: wp.array(dtype=int),
+        force: wp.array(dtype=vec3),
+        lever: wp.array(dtype=vec3),
+        tools: int,
+        blocks: wp.array2d(dtype=wp.vec3d),
+    ):
+        pairs = pair_spans[pair_spans.shape[0] - 1]
+        number = (pairs + wp.static(SUM_BLOCK) - 1) // wp.static(SUM_BLOCK)
+        for block in range(number * lane // lanes, number * (lane + 1) // lanes):
+            for tool in range(tools):
+                blocks[block * tools + tool, 0] = wp.vec3d(wp.float64(0.0))
+                blocks[block * tools + tool, 1] = wp.vec3d(wp.float64(0.0))
+            first = block * wp.static(SUM_BLOCK)
+            for contact in range(first, wp.min(first + wp.static(SUM_BLOCK), pairs)):
+                push = force[contact]
+                torque = wp.cross(lever[contact], push)
+                row = block * tools + tool_of[partner[contact]]
+                blocks[row, 0] = blocks[row, 0] - wp.vec3d(wp.float64(push[0]), wp.float64(push[1]), wp.float64(push[2]))
+                blocks[row, 1] = blocks[row, 1] - wp.vec3d(wp.float64(torque[0]), wp.float64(torque[1]), wp.float64(torque[2]))
+
+    return wrench_blocks

@@ -1,0 +1,7 @@
+"""``python -m sand_sim.node``."""
+
+import sys
+
+from sand_sim.node.main import main
+
+sys.exit(main())

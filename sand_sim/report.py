@@ -1,0 +1,51 @@
+"""What people read while a run goes on and when it is over."""
+
+from sand_sim.sinks.run_log import RunLog
+
+
+def progress_line(log: RunLog) -> str:
+    """One line on where a run is."""
+    row = log.rows[-1]
+    parts = [
+        f"t {row['time']:6.2f} s",
+        f"wall {row['wall']:6.1f} s",
+        f"real-time factor {log.real_time_factor:.3f}",
+        f"{row['contacts']:,} contacts",
+    ]
+    for tool in log.scene.tools:
+        x, y, z = row[f"{tool.name}.force"]
+        parts.append(f"{tool.name} ({x:.1f}, {y:.1f}, {z:.1f}) N, {row[f'{tool.name}.carried']:.2f} kg")
+    return "  ".join(parts)
+
+
+def summary_text(summary: dict) -> str:
+    """The summary of a run as a table, SI units."""
+    if not summary.get("steps"):
+        return "nothing was simulated"
+    energy = summary["energy_J"]
+    rows = [
+        ("grains", f"{summary['grains']:,} ({summary['retired_grains']} left the domain)"),
+        ("steps", f"{summary['steps']:,} of {summary['time_step_s'] * 1e6:.3g} us"),
+        (
+            "simulated",
+            f"{summary['simulated_s']:.2f} s in {summary['wall_s']:.1f} s, real-time factor {summary['real_time_factor']:.3f}",
+        ),
+        ("contacts", f"{summary['contacts']:,}"),
+        ("largest overlap / radius", f"{summary['largest_overlap_over_radius']:.4f}"),
+        (
+            "energy balance",
+            f"work of tools {energy['tool_work']:.4g} J = kinetic {energy['kinetic']:.3g} + potential {energy['potential']:.3g}"
+            f" + elastic {energy['elastic']:.3g} + dissipated {energy['dissipated']:.4g}",
+        ),
+    ]
+    for name, tool in summary["tools"].items():
+        rows.append((f"{name}: peak draft", f"{tool['peak_draft_N']:.1f} N"))
+        rows.append((f"{name}: peak lift", f"{tool['peak_lift_N']:.1f} N"))
+        if "carried_kg" in tool:
+            weight = tool["carried_weight_N"]
+            rows.append((f"{name}: carried", f"{tool['carried_kg']:.3f} kg (the tool feels {weight:.2f} N)"))
+            rows.append((f"{name}: spilled on the way", f"{tool['spilled_kg']:.3f} kg"))
+    for doubt in summary["doubts"]:
+        rows.append(("not to be trusted", doubt))
+    width = max(len(name) for name, _ in rows)
+    return "\n".join(f"  {name:<{width}}  {value}" for name, value in rows)

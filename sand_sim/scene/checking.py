@@ -1,0 +1,55 @@
+"""What can only be checked when the whole scene is known."""
+
+from itertools import combinations_with_replacement
+
+from sand_sim.scene.types import Scene, SceneError
+
+
+def check_scene(scene: Scene) -> None:
+    """Refuse a scene whose parts do not fit together.
+
+    Raises:
+        SceneError: naming the field and how to mend it.
+    """
+    if not scene.materials:
+        raise SceneError("materials: at least one material is needed")
+    if not scene.fills:
+        raise SceneError("fills: at least one fill is needed, there is nothing to simulate without grains")
+    known = {m.name for m in scene.materials}
+    used = [("fills", f.name, f.material) for f in scene.fills]
+    used += [("boundaries", b.name, b.material) for b in scene.boundaries]
+    used += [("tools", t.name, t.material) for t in scene.tools]
+    for section, name, material in used:
+        if material not in known:
+            raise SceneError(f"{section}: '{name}' is of unknown material '{material}'; known are {', '.join(sorted(known))}")
+    _check_pairs(scene, known)
+    for fill in scene.fills:
+        if fill.height is not None and fill.height > fill.high[2] - fill.low[2]:
+            raise SceneError(
+                f"fills: '{fill.name}' height {fill.height:g} m does not fit its region; raise region.high[2] above "
+                f"{fill.low[2] + fill.height:g}"
+            )
+    if scene.domain is not None:
+        for fill in scene.fills:
+            if fill.low is not None and not all(
+                d_low <= low and high <= d_high
+                for d_low, low, high, d_high in zip(scene.domain[0], fill.low, fill.high, scene.domain[1], strict=True)
+            ):
+                raise SceneError(f"domain: must contain the region of fill '{fill.name}', its grains would be retired at once")
+
+
+def _check_pairs(scene: Scene, known: set[str]) -> None:
+    given = []
+    for rule in scene.pairs:
+        for name in rule.between:
+            if name not in known:
+                raise SceneError(f"pairs: unknown material '{name}'; known are {', '.join(sorted(known))}")
+        if set(rule.between) in given:
+            raise SceneError(f"pairs: {' and '.join(rule.between)} are given twice")
+        given.append(set(rule.between))
+    grains = sorted({f.material for f in scene.fills})
+    others = {b.material for b in scene.boundaries} | {t.material for t in scene.tools}
+    needed = list(combinations_with_replacement(grains, 2)) + [(g, o) for g in grains for o in sorted(others)]
+    for a, b in needed:
+        if {a, b} not in given:
+            raise SceneError(f"pairs: no entry for '{a}' and '{b}', which can meet; add one with restitution and friction")

@@ -1,0 +1,280 @@
+"""From a scene file (YAML) to a checked ``Scene``."""
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from sand_sim.contact.normal import NORMAL_LAWS
+from sand_sim.contact.tangential import TANGENTIAL_LAWS
+from sand_sim.engine.precision import PRECISIONS
+from sand_sim.scene.checking import check_scene
+from sand_sim.scene.fields import Field
+from sand_sim.scene.types import (
+    Boundary,
+    Contact,
+    Fill,
+    Material,
+    PairRule,
+    Pose,
+    Scene,
+    SceneError,
+    Settle,
+    SizeDistribution,
+    Solver,
+    Tool,
+    Waypoint,
+)
+
+_SIDES = ("left", "right", "front", "back", "bottom", "top")
+
+
+def load_scene(path: str | Path) -> Scene:
+    """Read and check a scene file.
+
+    Args:
+        path: YAML file; relative paths in it start at its folder.
+
+    Raises:
+        SceneError: if the file cannot be read or a field is wrong; the message names the field and how to mend it.
+    """
+    path = Path(path)
+    try:
+        parsed = yaml.safe_load(path.read_text())
+    except OSError as error:
+        raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise SceneError(f"{path}: is not valid YAML: {' '.join(str(error).split())}") from None
+    try:
+        return read_scene(parsed, path.resolve().parent)
+    except SceneError as error:
+        raise SceneError(f"{path}: {error}") from None
+
+
+def read_scene(parsed: dict, folder: Path) -> Scene:
+    """Turn the content of a scene file into a checked ``Scene``.
+
+    Args:
+        parsed: mapping as YAML gives it.
+        folder: where relative paths start.
+
+    Raises:
+        SceneError: if a field is wrong.
+    """
+    top = Field(parsed).keys(
+        (
+            "name",
+            "gravity",
+            "domain",
+            "materials",
+            "pairs",
+            "fills",
+            "boundaries",
+            "tools",
+            "contact",
+            "solver",
+            "settle",
+            "duration",
+            "frame_rate",
+        ),
+        required=("materials", "pairs", "fills"),
+    )
+    scene = Scene(
+        name=top.optional("name", Field.text, "scene"),
+        gravity=top.optional("gravity", Field.vector, (0.0, 0.0, -9.81)),
+        domain=top.optional("domain", _corners, None),
+        materials=tuple(_material(name, entry) for name, entry in top["materials"].items()),
+        pairs=tuple(_pair(entry) for entry in top["pairs"].entries()),
+        fills=tuple(_fill(entry, folder) for entry in top["fills"].entries()),
+        boundaries=tuple(_boundary(entry) for entry in top["boundaries"].entries()) if "boundaries" in top else (),
+        tools=tuple(_tool(name, entry) for name, entry in top["tools"].items()) if "tools" in top else (),
+        contact=top.optional("contact", _contact, Contact()),
+        solver=top.optional("solver", _solver, Solver()),
+        settle=top.optional("settle", _settle, Settle()),
+        duration=top.optional("duration", lambda f: f.number(above=0.0, unit="s"), 1.0),
+        frame_rate=top.optional("frame_rate", lambda f: f.number(above=0.0, most=1e6, unit="1/s"), 50.0),
+        folder=folder,
+    )
+    check_scene(scene)
+    return scene
+
+
+def _material(name: str, entry: Field) -> Material:
+    entry.keys(("density", "young", "poisson"), required=("density", "young", "poisson"))
+    return Material(
+        name,
+        density=entry["density"].number(above=0.0, unit="kg/m^3"),
+        young=entry["young"].number(above=0.0, unit="Pa"),
+        poisson=entry["poisson"].number(least=0.0, most=0.5),
+    )
+
+
+def _pair(entry: Field) -> PairRule:
+    entry.keys(("between", "restitution", "friction"), required=("between", "restitution", "friction"))
+    names = entry["between"].entries()
+    if len(names) != 2:
+        raise entry["between"].refuse("must name two materials")
+    return PairRule(
+        between=(names[0].text(), names[1].text()),
+        restitution=entry["restitution"].number(above=0.0, most=1.0),
+        friction=entry["friction"].number(least=0.0),
+    )
+
+
+def _corners(entry: Field) -> tuple:
+    entry.keys(("low", "high"), required=("low", "high"))
+    low, high = entry["low"].vector(), entry["high"].vector()
+    if not all(a < b for a, b in zip(low, high, strict=True)):
+        raise entry.refuse(f"'low' {list(low)} must lie below 'high' {list(high)} on every axis [m]")
+    return low, high
+
+
+def _size(entry: Field) -> SizeDistribution:
+    if not isinstance(entry.value, dict):
+        return SizeDistribution("constant", mean=entry.number(above=0.0, unit="m"))
+    if "uniform" in entry.value:
+        entry.keys(("uniform",))
+        low, high = entry["uniform"].vector(2)
+        kind = SizeDistribution("uniform", low=low, high=high)
+    elif "normal" in entry.value:
+        normal = entry.keys(("normal",))["normal"].keys(("mean", "deviation", "low", "high"), ("mean", "deviation"))
+        mean, deviation = normal["mean"].number(above=0.0, unit="m"), normal["deviation"].number(least=0.0, unit="m")
+        low = normal.optional("low", Field.number, mean - 2.0 * deviation)
+        high = normal.optional("high", Field.number, mean + 2.0 * deviation)
+        kind = SizeDistribution("normal", mean=mean, deviation=deviation, low=low, high=high)
+    elif "table" in entry.value:
+        table = entry.keys(("table",))["table"].keys(("radii", "weights"), ("radii", "weights"))
+        radii = tuple(r.number(above=0.0, unit="m") for r in table["radii"].entries())
+        weights = tuple(w.number(least=0.0) for w in table["weights"].entries())
+        if len(radii) != len(weights) or not sum(weights):
+            raise table.refuse("needs as many weights as radii, and not all of them zero")
+        return SizeDistribution("table", radii=radii, weights=weights)
+    else:
+        raise entry.refuse("must be a radius [m], or one of 'uniform', 'normal', 'table'")
+    if not 0.0 < kind.low <= kind.high:
+        raise entry.refuse(f"radii must be positive and in order, got {kind.low:g} to {kind.high:g} [m]")
+    return kind
+
+
+def _fill(entry: Field, folder: Path) -> Fill:
+    entry.keys(("name", "material", "radius", "region", "count", "height", "file", "velocity", "seed"), required=("material",))
+    ways = [way for way in ("count", "height", "file") if way in entry]
+    if len(ways) != 1:
+        raise entry.refuse("give exactly one of 'count', 'height' and 'file'")
+    if ways != ["file"] and not ("radius" in entry and "region" in entry):
+        raise entry.refuse("the fields 'radius' and 'region' are needed unless the grains come from a file")
+    low, high = entry.optional("region", _corners, (None, None))
+    return Fill(
+        name=entry.optional("name", Field.text, entry.path),
+        material=entry["material"].text(),
+        size=entry.optional("radius", _size, None),
+        low=low,
+        high=high,
+        count=entry.optional("count", lambda f: f.whole(1), None),
+        height=entry.optional("height", lambda f: f.number(above=0.0, unit="m"), None),
+        file=entry.optional("file", lambda f: folder / f.text(), None),
+        velocity=entry.optional("velocity", Field.vector, (0.0, 0.0, 0.0)),
+        seed=entry.optional("seed", lambda f: f.whole(0), 0),
+    )
+
+
+def _boundary(entry: Field) -> Boundary:
+    kind = entry.keys(
+        ("type", "material", "name", "point", "normal", "axis", "radius", "low", "high", "open"), ("type", "material")
+    )["type"].choice(("plane", "box", "cylinder"))
+    needed = {"plane": ("point", "normal"), "box": ("low", "high"), "cylinder": ("point", "axis", "radius")}[kind]
+    optional = ("open",) if kind == "box" else ()
+    entry.keys(("type", "material", "name", *needed, *optional), needed)
+    common = {"kind": kind, "material": entry["material"].text(), "name": entry.optional("name", Field.text, kind)}
+    if kind == "plane":
+        return Boundary(**common, point=entry["point"].vector(), direction=entry["normal"].direction())
+    if kind == "cylinder":
+        radius = entry["radius"].number(above=0.0, unit="m")
+        return Boundary(**common, point=entry["point"].vector(), direction=entry["axis"].direction(), radius=radius)
+    low, high = _corners(Field({"low": entry.value["low"], "high": entry.value["high"]}, entry.path))
+    sides = tuple(side.choice(_SIDES) for side in entry["open"].entries()) if "open" in entry else ()
+    return Boundary(**common, low=low, high=high, open_sides=sides)
+
+
+def _pose(entry: Field) -> Pose:
+    entry.keys(("position", "orientation", "rpy"))
+    position = entry.optional("position", Field.vector, (0.0, 0.0, 0.0))
+    if "rpy" in entry:
+        return Pose(position, _quaternion_of_rpy(*entry["rpy"].vector()))
+    if "orientation" not in entry:
+        return Pose(position)
+    quaternion = np.array(entry["orientation"].vector(4))
+    length = np.linalg.norm(quaternion)
+    if length < 1e-6:
+        raise entry["orientation"].refuse("must not be the zero quaternion; [0, 0, 0, 1] is no rotation")
+    return Pose(position, tuple(quaternion / length))
+
+
+def _quaternion_of_rpy(roll: float, pitch: float, yaw: float) -> tuple:
+    """Fixed-axis roll, pitch, yaw [rad] (REP-103) to a quaternion x y z w."""
+    cr, sr, cp, sp, cy, sy = (f(a / 2.0) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
+    return (
+        float(sr * cp * cy - cr * sp * sy),
+        float(cr * sp * cy + sr * cp * sy),
+        float(cr * cp * sy - sr * sp * cy),
+        float(cr * cp * cy + sr * sp * sy),
+    )
+
+
+def _tool(name: str, entry: Field) -> Tool:
+    entry.keys(
+        ("mesh", "material", "particle_radius", "scale", "pose", "max_speed", "trajectory"),
+        required=("mesh", "material", "particle_radius"),
+    )
+    if not name.isidentifier():
+        raise entry.refuse("a tool's name becomes part of its topics: letters, digits and underscores only")
+    track = []
+    for stop in entry["trajectory"].entries() if "trajectory" in entry else []:
+        stop.keys(("time", "phase", "position", "orientation", "rpy"), required=("time",))
+        time = stop["time"].number(least=0.0, unit="s")
+        if track and time <= track[-1].time:
+            raise stop["time"].refuse(f"must be later than the waypoint before, at {track[-1].time:g} s")
+        pose = {key: stop.value[key] for key in ("position", "orientation", "rpy") if key in stop.value}
+        track.append(Waypoint(time, _pose(Field(pose, stop.path)), stop.optional("phase", Field.text, "")))
+    initial = track[0].pose if track and "pose" not in entry else Pose()
+    return Tool(
+        name,
+        mesh=entry["mesh"].text(),
+        material=entry["material"].text(),
+        particle_radius=entry["particle_radius"].number(above=0.0, unit="m"),
+        scale=entry.optional("scale", lambda f: f.number(above=0.0), 1.0),
+        pose=entry.optional("pose", _pose, initial),
+        max_speed=entry.optional("max_speed", lambda f: f.number(above=0.0, unit="m/s"), 2.0),
+        trajectory=tuple(track),
+    )
+
+
+def _contact(entry: Field) -> Contact:
+    entry.keys(("normal", "tangential"))
+    return Contact(
+        normal=entry.optional("normal", lambda f: f.choice(NORMAL_LAWS), "hertz"),
+        tangential=entry.optional("tangential", lambda f: f.choice(TANGENTIAL_LAWS), "mindlin"),
+    )
+
+
+def _solver(entry: Field) -> Solver:
+    entry.keys(("time_step", "skin", "precision", "device", "threads"))
+
+    def auto(key, read):
+        return None if entry.value.get(key) == "auto" else entry.optional(key, read, None)
+
+    return Solver(
+        time_step=auto("time_step", lambda f: f.number(above=0.0, unit="s")),
+        skin=auto("skin", lambda f: f.number(above=0.0, unit="m")),
+        precision=entry.optional("precision", lambda f: f.choice(PRECISIONS), "single"),
+        device=entry.optional("device", Field.text, "auto"),
+        threads=auto("threads", lambda f: f.whole(1)),
+    )
+
+
+def _settle(entry: Field) -> Settle:
+    entry.keys(("time", "speed"))
+    return Settle(
+        time=entry.optional("time", lambda f: f.number(least=0.0, unit="s"), 0.0),
+        speed=entry.optional("speed", lambda f: f.number(above=0.0, unit="m/s"), 0.01),
+    )

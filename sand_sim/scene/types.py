@@ -1,0 +1,179 @@
+"""Border 1, the Scene: everything that never changes while a world runs. SI units, REP-103 axes (x forward, z up)."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]  # x, y, z, w as in geometry_msgs
+
+
+class SceneError(ValueError):
+    """A scene that cannot be simulated; the message names the field and how to mend it."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a body is made of."""
+
+    name: str
+    density: float  # [kg/m^3]
+    young: float  # [Pa]
+    poisson: float  # [1]
+
+
+@dataclass(frozen=True)
+class PairRule:
+    """How two materials meet; valid both ways round."""
+
+    between: tuple[str, str]
+    restitution: float  # [1] in (0, 1]
+    friction: float  # [1] Coulomb mu
+
+
+@dataclass(frozen=True)
+class SizeDistribution:
+    """Grain radii, by number.
+
+    ``kind`` is ``constant`` (radius = mean), ``uniform`` (low to high), ``normal`` (mean and deviation, cut off at low and
+    high) or ``table`` (radii drawn with the given weights).
+    """
+
+    kind: str
+    mean: float = 0.0  # [m]
+    deviation: float = 0.0  # [m]
+    low: float = 0.0  # [m]
+    high: float = 0.0  # [m]
+    radii: tuple[float, ...] = ()  # [m]
+    weights: tuple[float, ...] = ()  # [1]
+
+
+@dataclass(frozen=True)
+class Fill:
+    """Grains put into a box-shaped region, or read from a file.
+
+    By ``count``, by ``height`` (of the bed above the region's floor once it has settled), or from ``file``.
+    """
+
+    name: str
+    material: str
+    size: SizeDistribution | None = None
+    low: Vector | None = None  # [m]
+    high: Vector | None = None  # [m]
+    count: int | None = None
+    height: float | None = None  # [m]
+    file: Path | None = None
+    velocity: Vector = (0.0, 0.0, 0.0)  # [m/s]
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """A fixed wall: ``plane`` (half space), ``box`` (grains inside, sides may be open) or ``cylinder`` (grains inside)."""
+
+    kind: str
+    material: str
+    name: str
+    point: Vector = (0.0, 0.0, 0.0)  # [m] of the plane, or on the cylinder's axis
+    direction: Vector = (0.0, 0.0, 1.0)  # [1] plane normal towards the grains, or cylinder axis
+    radius: float = 0.0  # [m]
+    low: Vector | None = None  # [m]
+    high: Vector | None = None  # [m]
+    open_sides: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Position [m] and orientation (unit quaternion, x y z w) of a frame in the world frame."""
+
+    position: Vector = (0.0, 0.0, 0.0)
+    orientation: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """A pose that a tool has at a time [s] of its trajectory, and the name of the phase that ends there."""
+
+    time: float
+    pose: Pose
+    phase: str = ""
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A driven rigid body, made of particles sampled from a mesh."""
+
+    name: str
+    mesh: str
+    material: str
+    particle_radius: float  # [m]
+    scale: float = 1.0  # [m per mesh unit]
+    pose: Pose = Pose()
+    max_speed: float = 2.0  # [m/s] of any point of the tool; faster commands are rejected
+    trajectory: tuple[Waypoint, ...] = ()
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One choice per slot of the contact law."""
+
+    normal: str = "hertz"
+    tangential: str = "mindlin"
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Numbers and choices of the time integration; None means chosen from the scene."""
+
+    time_step: float | None = None  # [s]
+    skin: float | None = None  # [m]
+    precision: str = "single"
+    device: str = "auto"
+    threads: int | None = None
+
+
+@dataclass(frozen=True)
+class Settle:
+    """Let the grains come to rest before time zero, with all tools at their initial poses."""
+
+    time: float = 0.0  # [s] at most
+    speed: float = 0.01  # [m/s] root mean square below which the bed counts as settled
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A whole scene, checked."""
+
+    name: str
+    materials: tuple[Material, ...]
+    pairs: tuple[PairRule, ...]
+    fills: tuple[Fill, ...]
+    boundaries: tuple[Boundary, ...] = ()
+    tools: tuple[Tool, ...] = ()
+    gravity: Vector = (0.0, 0.0, -9.81)  # [m/s^2]
+    domain: tuple[Vector, Vector] | None = None  # [m] corners; grains that leave it are retired
+    contact: Contact = Contact()
+    solver: Solver = Solver()
+    settle: Settle = Settle()
+    duration: float = 1.0  # [s] played by ``sand_sim run``
+    frame_rate: float = 50.0  # [1/s] observations per simulated second
+    folder: Path = field(default_factory=Path.cwd)  # relative paths start here
+
+    def material_index(self, name: str) -> int:
+        """Index of a material in ``materials``."""
+        return [m.name for m in self.materials].index(name)
+
+    def pair(self, a: str, b: str) -> PairRule:
+        """The rule for two materials, whichever way round it was given."""
+        return next(rule for rule in self.pairs if set(rule.between) == {a, b})
+
+    def tool(self, name: str) -> Tool:
+        """A tool by its name."""
+        return next(tool for tool in self.tools if tool.name == name)
+
+
+def unit(vector: Vector) -> np.ndarray:
+    """The vector at length one, shape (3,)."""
+    array = np.asarray(vector, float)
+    return array / np.linalg.norm(array)

@@ -1,0 +1,140 @@
+"""A still picture of a run: wrench against time beside cut-away views of the bed and the tools. Needs matplotlib."""
+
+from pathlib import Path
+
+import numpy as np
+
+from sand_sim import rotation
+from sand_sim.assemble import ToolModel
+from sand_sim.border import GrainCloud, Observation
+from sand_sim.sinks.colours import colour_by_speed
+from sand_sim.sinks.run_log import RunLog
+
+_VIEWS = 3
+_TILT = np.radians(14.0)  # of the view from the horizontal
+_STEEL = np.array([0.52, 0.56, 0.64])
+_LIGHT = np.array([-0.35, -0.55, 0.76])
+
+
+def draw_run(log: RunLog, tools: list[ToolModel], path: Path) -> None:
+    """Draw a run into a PNG file.
+
+    Args:
+        log: the run; one view is drawn at the end of each of its last named phases that differ most in time.
+        tools: with their meshes.
+        path: of the file; its folder is made.
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    columns, views = log.columns(), _pick_views(log)
+    figure = plt.figure(figsize=(13.0, 7.2), layout="constrained")
+    left, right = figure.subfigures(1, 2, width_ratios=[1.0, 1.15])
+    _draw_curves(left, columns, log)
+    axes = np.atleast_1d(right.subplots(len(views), 1))
+    for axis, (_, observation) in zip(axes, views, strict=True):
+        _draw_view(axis, observation, tools)
+    widest = [f(limits) for f, limits in zip((min, max), zip(*(axis.get_xlim() for axis in axes), strict=True), strict=True)]
+    for axis, (name, observation) in zip(axes, views, strict=True):
+        axis.set_xlim(widest)
+        axis.set_title(f"{name}, t = {observation.time:.2f} s", fontsize=9, loc="left")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def _pick_views(log: RunLog) -> list[tuple[str, Observation]]:
+    wanted = [name for name in ("cut", "carry", "dump") if name in log.scenes] or list(log.scenes)[-_VIEWS:]
+    return [(name, log.scenes[name]) for name in wanted] or [("end", log.last)]
+
+
+def _draw_curves(figure, columns: dict[str, np.ndarray], log: RunLog) -> None:
+    time, names = columns["time"], [tool.name for tool in log.scene.tools]
+    rows = figure.subplots(3 if names else 1, 1, sharex=True, squeeze=False)[:, 0]
+    for name in names:
+        for k, axis in enumerate("xyz"):
+            rows[0].plot(time, columns[f"{name}.force"][:, k], lw=1.2, label=f"{name} {axis}")
+            rows[1].plot(time, columns[f"{name}.torque"][:, k], lw=1.2, label=f"{name} {axis}")
+    if names:
+        rows[0].set_ylabel("force of the sand on the tool,\nworld frame [N]")
+        rows[1].set_ylabel("torque about the tool frame's\norigin, tool frame [N m]")
+        rows[0].legend(fontsize=8, ncols=3)
+    for name in names:
+        rows[-1].plot(time, columns[f"{name}.carried"], color="tab:brown", lw=1.4, label=f"carried by {name}")
+    rows[-1].set_ylabel("mass in the tool [kg]" if names else "kinetic energy [J]")
+    if not names:
+        rows[-1].plot(time, columns["kinetic"], lw=1.2)
+    rows[-1].set_xlabel("simulated time [s]")
+    for row in rows:
+        row.grid(alpha=0.3)
+        row.margins(x=0.01)
+
+
+def _project(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Seen from -y, tilted down: picture coordinates, shape (n, 2), and depth away from the eye, shape (n,)."""
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    return np.stack([x, z * np.cos(_TILT) + y * np.sin(_TILT)], -1), y * np.cos(_TILT) - z * np.sin(_TILT)
+
+
+def _draw_view(axis, observation: Observation, tools: list[ToolModel]) -> None:
+    """Grains and tool faces behind the plane through the first tool, far ones first."""
+    from matplotlib.collections import EllipseCollection, PolyCollection
+
+    cut = observation.tools[0].position[1] if observation.tools else -np.inf
+    grains: GrainCloud = observation.grains
+    shown = np.flatnonzero(grains.position[:, 1] > cut - grains.radius)
+    spots, depth = _project(grains.position[shown])
+    colours = colour_by_speed(grains.speed[shown], 1.0) / 255.0
+    shade = 0.62 + 0.38 * np.clip(1.0 - (depth - depth.min()) / (np.ptp(depth) or 1.0), 0.0, 1.0)
+    items = [(d, "grain", k) for k, d in enumerate(depth)]
+    faces, face_colours = _tool_faces(observation, tools, cut)
+    items += [(d, "face", k) for k, (d, _) in enumerate(faces)]
+    items.sort(key=lambda item: -item[0])
+    start = 0
+    for end in range(1, len(items) + 1):
+        if end < len(items) and items[end][1] == items[start][1]:
+            continue
+        run = [item[2] for item in items[start:end]]
+        if items[start][1] == "grain":
+            size = 2.0 * grains.radius[shown][run]
+            centre = spots[run]
+            common = {"units": "xy", "offset_transform": axis.transData}
+            body = EllipseCollection(size, size, 0, offsets=centre, facecolors=colours[run] * shade[run, None], **common)
+            body.set_edgecolor("#5a4326")
+            body.set_linewidth(0.25)
+            axis.add_collection(body)
+            light = np.clip(colours[run] * shade[run, None] * 1.25, 0.0, 1.0)
+            glint = centre + 0.14 * size[:, None] * np.array([-1.0, 1.0])
+            axis.add_collection(EllipseCollection(0.42 * size, 0.42 * size, 0, offsets=glint, facecolors=light, **common))
+        else:
+            colour, outlines = face_colours[run], [faces[k][1] for k in run]
+            axis.add_collection(PolyCollection(outlines, facecolors=colour, edgecolors=colour, linewidths=0.4))
+        start = end
+    corners = np.concatenate([spots, *(polygon for _, polygon in faces)]) if faces else spots
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    pad = 0.03 * float(np.max(high - low))
+    axis.set_xlim(low[0] - pad, high[0] + pad)
+    axis.set_ylim(low[1] - pad, high[1] + pad)
+    axis.set_aspect("equal")
+    axis.set_xlabel("x [m]", fontsize=8)
+    axis.tick_params(labelsize=7)
+    axis.set_yticks([])
+    for side in ("top", "left", "right"):
+        axis.spines[side].set_visible(False)
+
+
+def _tool_faces(observation: Observation, tools: list[ToolModel], cut: float):
+    """Depth and outline of every tool face behind the cut, and their colours, shape (n, 3)."""
+    faces, colours = [], []
+    for report, model in zip(observation.tools, tools, strict=True):
+        mesh = model.mesh.subdivide_to_size(0.25 * float(np.max(model.mesh.extents)))
+        corners = report.position + rotation.rotate(report.orientation, np.asarray(mesh.vertices))[np.asarray(mesh.faces)]
+        normals = rotation.rotate(report.orientation, np.asarray(mesh.face_normals))
+        behind = corners[:, :, 1].mean(axis=1) > cut
+        outlines, depths = _project(corners[behind])
+        bright = 0.55 + 0.45 * np.abs(normals[behind] @ (_LIGHT / np.linalg.norm(_LIGHT)))
+        faces += [(float(d.mean()), outline) for d, outline in zip(depths, outlines, strict=True)]
+        colours.append(_STEEL * bright[:, None])
+    return faces, np.concatenate(colours) if colours else np.zeros((0, 3))

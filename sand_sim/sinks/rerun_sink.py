@@ -1,0 +1,115 @@
+"""Recordings for Rerun: grains, tools, wrenches and health on simulated time."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from sand_sim.border import Observation
+from sand_sim.sinks.colours import colour_by_speed
+from sand_sim.world import World
+
+_TIMELINE = "sim_time"
+_VIEWER_PORT = 9876
+_AXES = "xyz"
+
+
+class RerunSink:
+    """Writes observations to a recording file, to a viewer, or to both.
+
+    Args:
+        world: whose walls and tools are drawn.
+        path: of the .rrd file; its folder is made. None for no file.
+        view: open the viewer.
+        particles: also draw the particles of the tools.
+    """
+
+    def __init__(self, world: World, path: Path | None, view: bool = False, particles: bool = False):
+        self._fastest = max((tool.max_speed for tool in world.scene.tools), default=1.0)
+        self._identity = np.zeros(0, int)
+        self._recording = rr.RecordingStream("sand_sim", recording_id=None)
+        sinks = []
+        if path is not None:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            sinks.append(rr.FileSink(str(path)))
+        if view:
+            # The viewer's own spawn helper listens on all interfaces; this one on this machine only.
+            subprocess.Popen([sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", str(_VIEWER_PORT)])
+            sinks.append(rr.GrpcSink(f"rerun+http://127.0.0.1:{_VIEWER_PORT}/proxy"))
+        self._recording.set_sinks(*sinks, default_blueprint=_blueprint(world))
+        self._draw_still(world, particles)
+
+    def write(self, observation: Observation) -> None:
+        """Add one observation."""
+        recording, grains, health = self._recording, observation.grains, observation.health
+        recording.set_time(_TIMELINE, duration=observation.time)
+        recording.log(
+            "world/grains",
+            rr.Points3D.from_fields(
+                positions=grains.position.astype(np.float32), colors=colour_by_speed(grains.speed, self._fastest)
+            ),
+        )
+        if not np.array_equal(grains.identity, self._identity):
+            self._identity = grains.identity
+            recording.log("world/grains", rr.Points3D.from_fields(radii=grains.radius.astype(np.float32)))
+        for tool in observation.tools:
+            pose = rr.Transform3D(translation=tool.position, quaternion=rr.Quaternion(xyzw=tool.orientation))
+            recording.log(f"world/tools/{tool.name}", pose)
+            for axis in range(3):
+                recording.log(f"force/{tool.name}/{_AXES[axis]}", rr.Scalars(tool.world_force[axis]))
+                recording.log(f"torque/{tool.name}/{_AXES[axis]}", rr.Scalars(tool.torque[axis]))
+            recording.log(f"carried/{tool.name}", rr.Scalars(tool.carried))
+        shown = {
+            "overlap": health.deepest,
+            "energy/kinetic": health.kinetic,
+            "energy/elastic": health.elastic,
+            "energy/dissipated": health.dissipated,
+            "contacts": health.contacts,
+            "fastest": health.fastest,
+        }
+        for name, value in shown.items():
+            recording.log(f"health/{name}", rr.Scalars(value))
+
+    def close(self) -> None:
+        """Write out what is pending."""
+        self._recording.flush()
+        self._recording.disconnect()
+
+    def _draw_still(self, world: World, particles: bool) -> None:
+        """Draw what never changes: axes, walls, tool meshes and particles."""
+        recording = self._recording
+        recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for boundary in world.scene.boundaries:
+            if boundary.kind == "box":
+                box = rr.Boxes3D(mins=[boundary.low], sizes=[np.subtract(boundary.high, boundary.low)], colors=[[150, 150, 160]])
+                recording.log(f"world/walls/{boundary.name}", box, static=True)
+        for model in world.tools:
+            name = f"world/tools/{model.tool.name}"
+            corners = np.asarray(model.mesh.triangles, np.float32)  # each face has its own, so that edges look sharp
+            mesh = rr.Mesh3D(
+                vertex_positions=corners.reshape(-1, 3),
+                vertex_normals=np.repeat(np.asarray(model.mesh.face_normals, np.float32), 3, axis=0),
+                albedo_factor=[140, 150, 165, 255],
+            )
+            recording.log(f"{name}/mesh", mesh, static=True)
+            if particles:
+                points = rr.Points3D(model.body.points.astype(np.float32), radii=model.body.radius, colors=[[90, 120, 190]])
+                recording.log(f"{name}/particles", points, static=True)
+
+
+def _blueprint(world: World) -> rrb.Blueprint:
+    """The bed and the tools large on the left, the curves stacked on the right."""
+    names = [tool.name for tool in world.scene.tools]
+    curves = [rrb.TimeSeriesView(origin=f"force/{name}", name=f"{name}: force of the sand, world frame [N]") for name in names]
+    curves += [rrb.TimeSeriesView(origin="carried", name="carried mass [kg]")] if names else []
+    curves += [
+        rrb.TimeSeriesView(origin="health/energy", name="energy [J]"),
+        rrb.TimeSeriesView(origin="health/overlap", name="largest overlap / radius"),
+    ]
+    return rrb.Blueprint(
+        rrb.Horizontal(rrb.Spatial3DView(origin="world", name="bed and tools"), rrb.Vertical(*curves), column_shares=[3, 2]),
+        collapse_panels=True,
+    )

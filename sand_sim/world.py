@@ -1,0 +1,195 @@
+"""A running world: commands in, steps, observations out."""
+
+import numpy as np
+
+from sand_sim import rotation
+from sand_sim.assemble import Assembly, Progress, ToolModel, assemble
+from sand_sim.border import CommandError, Observation, ToolPose
+from sand_sim.engine.tools import ToolTrack
+from sand_sim.observing import observe_grains, observe_health, observe_tools
+from sand_sim.scene.types import Scene
+from sand_sim.track import Track
+
+_SETTLE_CHUNKS = 50
+_SPEED_TOLERANCE = 1.02
+
+
+class World:
+    """Grains, walls and tools of a scene, settled as it asks.
+
+    Args:
+        scene: checked scene.
+        progress: called with the name of a stage of the preparation and the share of it that is done, 0 to 1.
+
+    Raises:
+        SceneError: if the scene cannot be made into a world.
+    """
+
+    def __init__(self, scene: Scene, progress: Progress = lambda stage, share: None):
+        self.scene = scene
+        self.assembly: Assembly = assemble(scene, progress)
+        self._solver = self.assembly.solver
+        self._tool_index = {tool.name: k for k, tool in enumerate(scene.tools)}
+        self._set_tracks([Track.rest(tool.pose) for tool in scene.tools])
+        self._settle(progress)
+        self._strike_off()
+        self._solver.begin()
+        sums = self._solver.measure()
+        self._start_height = sums.height
+        self._start_energy = sums.translation + sums.rotation + sums.height + sums.elastic
+        self._observed_steps = 0
+        self._initial = self.save()
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._solver.steps_done * self.time_step
+
+    @property
+    def time_step(self) -> float:
+        """[s]."""
+        return self.assembly.time_step.value
+
+    @property
+    def frame_steps(self) -> int:
+        """Steps that make a frame at the scene's frame rate."""
+        return self.assembly.frame_steps
+
+    @property
+    def tools(self) -> list[ToolModel]:
+        """Tools with their meshes and particles, in the order of the scene."""
+        return self.assembly.tools
+
+    def check(self, command: ToolPose) -> ToolPose:
+        """See that a command makes sense by itself, and bring its orientation to length one.
+
+        Raises:
+            CommandError: if the tool is unknown, or pose or time are not finite.
+        """
+        tool = f"tool '{command.tool}'"
+        if command.tool not in self._tool_index:
+            raise CommandError("unknown_tool", f"{tool} is unknown; known are {', '.join(self._tool_index) or 'none'}")
+        position, orientation = np.asarray(command.position, float), np.asarray(command.orientation, float)
+        numbers = np.concatenate([position, orientation, [command.time or 0.0]])
+        if not np.all(np.isfinite(numbers)):
+            raise CommandError("not_finite", f"{tool}: position, orientation and time must be finite")
+        length = float(np.linalg.norm(orientation))
+        if length < 1e-6:
+            raise CommandError("zero_quaternion", f"{tool}: orientation is the zero quaternion; (0, 0, 0, 1) is no rotation")
+        return ToolPose(command.tool, position, orientation / length, command.time)
+
+    def apply(self, command: ToolPose) -> None:
+        """Set a tool on its way to a pose; without a time it gets there as fast as it may.
+
+        Raises:
+            CommandError: as ``check``, and if the time has passed or the tool would be too fast; the world is unchanged then.
+        """
+        command = self.check(command)
+        tool, index, now = f"tool '{command.tool}'", self._tool_index[command.tool], self.time
+        if command.time is not None and command.time <= now:
+            raise CommandError("late", f"{tool}: time {command.time:.6f} s has passed, simulated time is {now:.6f} s")
+        fastest = self.tools[index].tool.max_speed
+        soonest = now + self.travel(command) / fastest
+        end = max(soonest, now + self.time_step) if command.time is None else command.time
+        begin_position, begin_orientation = self._tracks[index].at(now)
+        speed = (soonest - now) / (end - now) * fastest
+        if speed > fastest * _SPEED_TOLERANCE:
+            raise CommandError(
+                "too_fast",
+                f"{tool} would move at {speed:.3g} m/s, its max_speed is {fastest:.3g} m/s; "
+                "command nearer poses or later times, or raise max_speed in the scene",
+            )
+        track = Track(now, end, begin_position, command.position, begin_orientation, command.orientation)
+        self._set_tracks([*self._tracks[:index], track, *self._tracks[index + 1 :]])
+
+    def travel(self, command: ToolPose) -> float:
+        """How far any point of the tool moves at most on its way from where it is to the commanded pose [m]."""
+        index = self._tool_index[command.tool]
+        position, orientation = self._tracks[index].at(self.time)
+        turn = rotation.to_vector(rotation.multiply(command.orientation, rotation.inverse(orientation)))
+        return float(np.linalg.norm(command.position - position) + np.linalg.norm(turn) * self.tools[index].extent)
+
+    def arrival(self, tool: str) -> float:
+        """When a tool reaches, or has reached, its last commanded pose [s]."""
+        return self._tracks[self._tool_index[tool]].end_time
+
+    def resting(self, tool: str) -> bool:
+        """Whether a tool has reached its last commanded pose."""
+        return self.time > self.arrival(tool) - 0.5 * self.time_step
+
+    def step(self, steps: int = 1) -> None:
+        """Advance by a number of time steps.
+
+        Raises:
+            UnstableError: if a velocity is no longer finite.
+        """
+        self._solver.run(steps)
+
+    def observe(self) -> Observation:
+        """What the world shows now; forces on tools are means since the last observation."""
+        steps = self._solver.steps_done
+        cloud = observe_grains(self.assembly)
+        passed = (steps - self._observed_steps) * self.time_step
+        reports = observe_tools(self.assembly, self._tracks, cloud, self.time, passed)
+        self._observed_steps = steps
+        if reports:
+            self._solver.arrays.tools.impulse.zero_()
+        health = observe_health(self.assembly, self._start_energy, self._start_height)
+        return Observation(self.time, steps, cloud, reports, health)
+
+    def reset(self) -> None:
+        """Go back to time zero."""
+        self.restore(self._initial)
+
+    def save(self) -> dict[str, np.ndarray]:
+        """The whole state as plain arrays; put back with ``restore`` it goes on to the bit."""
+        state = self._solver.take_state()
+        for name in Track.__dataclass_fields__:
+            state[f"track.{name}"] = np.array([getattr(track, name) for track in self._tracks])
+        state["start"] = np.array([self._start_energy, self._start_height])
+        state["observed_steps"] = np.array(self._observed_steps)
+        return state
+
+    def restore(self, state: dict[str, np.ndarray]) -> None:
+        """Put a state from ``save`` back."""
+        self._solver.put_state(state)
+        columns = [state[f"track.{name}"] for name in Track.__dataclass_fields__]
+        self._tracks = [Track(*values) for values in zip(*columns, strict=True)]
+        self._start_energy, self._start_height = (float(value) for value in state["start"])
+        self._observed_steps = int(state["observed_steps"])
+
+    def _set_tracks(self, tracks: list[Track]) -> None:
+        self._tracks = tracks
+        structs = []
+        for track in tracks:
+            one = ToolTrack()
+            one.begin_time, one.end_time = track.begin_time, track.end_time
+            one.begin_position, one.begin_rotation = track.begin_position, track.begin_orientation
+            one.velocity, one.spin = track.velocity, track.spin
+            structs.append(one)
+        if structs:
+            self._solver.arrays.tools.set_tracks(structs)
+
+    def _settle(self, progress: Progress) -> None:
+        settle = self.scene.settle
+        if settle.time <= 0.0:
+            return
+        chunk = max(1, round(settle.time / _SETTLE_CHUNKS / self.time_step))
+        for done in range(_SETTLE_CHUNKS):
+            self._solver.run(chunk)
+            cloud = observe_grains(self.assembly)
+            speed = np.sqrt(np.sum(cloud.mass * cloud.speed**2) / np.sum(cloud.mass))
+            progress("settling", (done + 1) / _SETTLE_CHUNKS)
+            if speed < settle.speed:
+                progress("settling", 1.0)
+                break
+
+    def _strike_off(self) -> None:
+        """Take away what lies above the asked height of a fill."""
+        cloud, first = observe_grains(self.assembly), 0
+        for fill, number in zip(self.scene.fills, self.assembly.fill_numbers, strict=True):
+            if fill.height is not None:
+                own = (cloud.identity >= first) & (cloud.identity < first + number)
+                above = cloud.position[:, 2] + cloud.radius > fill.low[2] + fill.height
+                self._solver.remove(cloud.identity[own & above])
+            first += number

@@ -1,0 +1,54 @@
+"""Package set-up for colcon (ament_python) and for pip; everything is pinned, see constraints.txt for the rest."""
+
+from glob import glob
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "sand_sim"
+SHARE = f"share/{NAME}"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Robots digging and scooping sand, grain by grain, on any CPU or a GPU, driven by ROS 2 topics",
+    long_description=Path(__file__).with_name("README.md").read_text(),
+    long_description_content_type="text/markdown",
+    license="Apache-2.0",
+    license_files=["LICENSE"],
+    python_requires=">=3.12,<3.13",
+    packages=find_packages(include=["sand_sim*", "sampler*", "msg_adapters*"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (SHARE, ["package.xml"]),
+        (f"{SHARE}/config", glob("config/*.yaml")),
+        (f"{SHARE}/config/meshes", glob("config/meshes/*.stl")),
+        (f"{SHARE}/launch", glob("launch/*.launch.py")),
+    ],
+    zip_safe=True,
+    install_requires=[
+        "setuptools",
+        "numpy==2.5.5",
+        "warp-lang==1.19.0",
+        "trimesh==5.2.0",
+        "pycollada==0.9.3",
+        "rerun-sdk==0.41.0",
+        "PyYAML==6.0.3",
+    ],
+    extras_require={
+        # Only for machines without an apt ROS, which these wheels would hide.
+        "ros": [
+            "ros-jazzy-rclpy==7.1.6",
+            "ros-jazzy-common-interfaces==5.3.6",
+            "ros-jazzy-rmw-fastrtps-cpp==8.4.3",
+        ],
+        "figures": ["matplotlib==3.11.2"],
+        "test": ["pytest==9.2.0", "ruff==0.17.6"],
+    },
+    entry_points={
+        "console_scripts": [
+            "sand_sim = sand_sim.cli.main:main",
+            "sand_sim_node = sand_sim.node.main:main",
+        ],
+    },
+)
