@@ -96,6 +96,19 @@ class ToolReport:
 
 
 @dataclass(frozen=True)
+class WallReport:
+    """What a wall feels.
+
+    Attributes:
+        name: of the boundary, with the side of a box, as in ``bin/bottom``.
+        force: of the grains on the wall at the last step, world frame, shape (3,) [N].
+    """
+
+    name: str
+    force: np.ndarray
+
+
+@dataclass(frozen=True)
 class Health:
     """How far a run can be trusted.
 
@@ -135,6 +148,7 @@ class Observation:
         steps: since the start.
         grains: all grains.
         tools: one report per tool, in the order of the scene.
+        walls: one report per wall, in the order of the scene.
         health: error indicators.
     """
 
@@ -142,8 +156,13 @@ class Observation:
     steps: int
     grains: GrainCloud
     tools: tuple[ToolReport, ...]
+    walls: tuple[WallReport, ...]
     health: Health
 
     def tool(self, name: str) -> ToolReport:
         """The report of a tool by its name."""
         return next(report for report in self.tools if report.name == name)
+
+    def wall(self, name: str) -> WallReport:
+        """The report of a wall by its name."""
+        return next(report for report in self.walls if report.name == name)

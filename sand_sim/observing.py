@@ -4,7 +4,7 @@ import numpy as np
 
 from sand_sim import rotation
 from sand_sim.assemble import Assembly, ToolModel
-from sand_sim.border import GrainCloud, Health, ToolReport
+from sand_sim.border import GrainCloud, Health, ToolReport, WallReport
 from sand_sim.track import Track
 from sand_sim.trust import find_doubts
 
@@ -67,6 +67,17 @@ def observe_tools(
             )
         )
     return tuple(reports)
+
+
+def observe_walls(assembly: Assembly) -> tuple[WallReport, ...]:
+    """Forces on all walls at the last step."""
+    contacts = assembly.solver.arrays.wall_list
+    if contacts is None:
+        return ()
+    number = contacts.pairs.get()
+    wall, force = contacts.partner.numpy()[:number], contacts.force.numpy()[:number].astype(float)
+    totals = np.column_stack([np.bincount(wall, force[:, k], len(assembly.walls)) for k in range(3)])
+    return tuple(WallReport(one.name, -total) for one, total in zip(assembly.walls, totals, strict=True))
 
 
 def observe_health(assembly: Assembly, start_energy: float, start_height: float) -> Health:

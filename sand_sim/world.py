@@ -6,7 +6,7 @@ from sand_sim import rotation
 from sand_sim.assemble import Assembly, Progress, ToolModel, assemble
 from sand_sim.border import CommandError, Observation, ToolPose
 from sand_sim.engine.tools import ToolTrack
-from sand_sim.observing import observe_grains, observe_health, observe_tools
+from sand_sim.observing import observe_grains, observe_health, observe_tools, observe_walls
 from sand_sim.scene.types import Scene
 from sand_sim.track import Track
 
@@ -135,7 +135,7 @@ class World:
         if reports:
             self._solver.arrays.tools.impulse.zero_()
         health = observe_health(self.assembly, self._start_energy, self._start_height)
-        return Observation(self.time, steps, cloud, reports, health)
+        return Observation(self.time, steps, cloud, reports, observe_walls(self.assembly), health)
 
     def reset(self) -> None:
         """Go back to time zero."""

@@ -36,7 +36,7 @@ def build_hertz(precision: Precision) -> wp.Function:
     @wp.func
     def hertz(contact: types.contact, pair: types.pair) -> real:
         tangent = real(2.0) * pair.young * contact.patch
-        elastic = real(2.0 / 3.0) * tangent * contact.overlap
+        elastic = real(2.0) / real(3.0) * tangent * contact.overlap
         viscous = pair.normal_damping * contact.inertia * contact.normal_speed
         return wp.max(elastic - viscous, real(0.0))
 
@@ -49,7 +49,7 @@ def build_hertz_energy(precision: Precision) -> wp.Function:
 
     @wp.func
     def hertz_energy(contact: types.contact, pair: types.pair) -> real:
-        return real(8.0 / 15.0) * pair.young * contact.patch * contact.overlap * contact.overlap
+        return real(8.0) / real(15.0) * pair.young * contact.patch * contact.overlap * contact.overlap
 
     return hertz_energy
 

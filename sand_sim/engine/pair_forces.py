@@ -13,19 +13,48 @@ from sand_sim.engine.recipe import Recipe
 
 
 @cache
-def build_gap(precision: Precision) -> wp.Function:
-    """Warp function ``(vector from b to a [m], sum of radii [m]) -> (normal, overlap [m])``; coinciding centres part upwards."""
+def build_direction(precision: Precision) -> wp.Function:
+    """Warp function ``vector from b to a -> (normal, distance)``; coinciding centres part upwards."""
     real, vec3 = precision.real, precision.vec3
 
     @wp.func
-    def gap(apart: vec3, reach: real):
+    def direction(apart: vec3):
         normal = vec3(real(0.0), real(0.0), real(1.0))
         distance = wp.length(apart)
         if distance > real(0.0):
             normal = apart / distance
-        return normal, wp.max(reach - distance, real(0.0))
+        return normal, distance
 
-    return gap
+    return direction
+
+
+@cache
+def build_excess(precision: Precision) -> wp.Function:
+    """Warp function ``(r_a + r_b)^2 - |x_a - x_b|^2`` [quantum^2], positive where spheres touch.
+
+    In single precision the lattice allows it to be computed exactly in 64-bit whole numbers, so that an overlap of a millionth of
+    the radius still has seven digits; the difference of two rounded distances would have one.
+    """
+    real, whole4, exact = precision.real, precision.whole4, precision.whole is wp.int32
+
+    @wp.func
+    def excess(at_a: whole4, at_b: whole4) -> real:
+        result = real(0.0)
+        if wp.static(exact):
+            x = wp.int64(at_a[0] - at_b[0])
+            y = wp.int64(at_a[1] - at_b[1])
+            z = wp.int64(at_a[2] - at_b[2])
+            reach = wp.int64(at_a[3] + at_b[3])
+            result = real(reach * reach - x * x - y * y - z * z)
+        else:
+            u = real(at_a[0] - at_b[0])
+            v = real(at_a[1] - at_b[1])
+            w = real(at_a[2] - at_b[2])
+            span = real(at_a[3] + at_b[3])
+            result = span * span - u * u - v * v - w * w
+        return result
+
+    return excess
 
 
 @cache
@@ -34,7 +63,7 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     precision, rotation, materials = recipe.precision, recipe.rotation, recipe.materials
     real, vec3, vec4, whole4 = precision.real, precision.vec3, precision.vec4, precision.whole4
     types = contact_types(precision)
-    gap = build_gap(precision)
+    excess_of, direction = build_excess(precision), build_direction(precision)
     meeting = build_meeting(precision)
     act, release = build_act(recipe, measuring)
 
@@ -64,10 +93,13 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
             b = partner[contact]
             at_a = place[a]
             at_b = place[b]
-            apart = vec3(real(at_a[0] - at_b[0]), real(at_a[1] - at_b[1]), real(at_a[2] - at_b[2])) * quantum
-            reach = real(at_a[3] + at_b[3]) * quantum
-            if wp.dot(apart, apart) < reach * reach:
-                normal, overlap = gap(apart, reach)
+            excess = excess_of(at_a, at_b)
+            if excess > real(0.0):
+                apart = vec3(real(at_a[0] - at_b[0]), real(at_a[1] - at_b[1]), real(at_a[2] - at_b[2]))
+                span = real(at_a[3] + at_b[3])
+                normal, distance = direction(apart)
+                overlap = excess / (span + distance) * quantum
+                reach = span * quantum
                 radius_a = real(at_a[3]) * quantum
                 radius_b = real(at_b[3]) * quantum
                 half = real(0.5) * overlap

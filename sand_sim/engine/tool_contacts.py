@@ -13,7 +13,7 @@ from sand_sim.contact.response import build_meeting
 from sand_sim.engine.act import build_act
 from sand_sim.engine.contact_list import listed_at
 from sand_sim.engine.kernel import kernel
-from sand_sim.engine.pair_forces import build_gap
+from sand_sim.engine.pair_forces import build_direction
 from sand_sim.engine.precision import Precision
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.tools import tool_types
@@ -121,7 +121,7 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     precision, rotation, materials = recipe.precision, recipe.rotation, recipe.materials
     real, vec3, vec4, whole4 = precision.real, precision.vec3, precision.vec4, precision.whole4
     types, (shape_type, state_type) = contact_types(precision), tool_types(precision)
-    from_tool, gap = build_from_tool(precision), build_gap(precision)
+    from_tool, direction = build_from_tool(precision), build_direction(precision)
     meeting = build_meeting(precision)
     act, release = build_act(recipe, measuring)
 
@@ -163,7 +163,8 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
             radius = real(here[3]) * quantum
             reach = radius + shape.radius
             if wp.dot(apart, apart) < reach * reach:
-                normal, overlap = gap(apart, reach)
+                normal, distance = direction(apart)
+                overlap = wp.max(reach - distance, real(0.0))
                 half = real(0.5) * overlap
                 point = arm + normal * (shape.radius - half)
                 of_i = motion[i]

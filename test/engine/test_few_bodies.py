@@ -1,0 +1,170 @@
+"""Few bodies: equilibrium, bouncing, conservation, reproducibility."""
+
+import numpy as np
+import pytest
+from scenes import floor, record
+
+SAND = {"density": 2650.0, "young": 1e7, "poisson": 0.3}
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_stack_of_ten(make_world, precision):
+    """Ten equal Hertz spheres on a rigid floor; overlaps follow from the weights above."""
+    radius, number, start = 0.005, 10, 0.0
+    position = np.column_stack([np.zeros(number), np.zeros(number), start + radius * (2.0 * np.arange(number) + 1.0) * 0.9985])
+    world = make_world(
+        position,
+        radius,
+        material=SAND,
+        restitution=0.2,
+        friction=0.0,
+        gravity=[0.0, 0.0, -9.81],
+        boundaries=floor(),
+        precision=precision,
+    )
+    world.step(round(0.6 / world.time_step))
+    observation = world.observe()
+    z = observation.grains.position[:, 2]
+    assert observation.health.fastest < 1e-5
+    assert radius - z[0] == pytest.approx(25.844e-6, rel=1e-3)
+    assert 2.0 * radius - (z[1] - z[0]) == pytest.approx(48.181e-6, rel=1e-3)
+    assert 2.0 * radius - (z[9] - z[8]) == pytest.approx(11.136e-6, rel=1e-3)
+    assert z[9] == pytest.approx(94.6913e-3, rel=1e-6)
+    assert -observation.wall("floor").force[2] == pytest.approx(0.136117, rel=1e-3)
+
+
+def test_bouncing_ball(make_world):
+    """The n-th peak is ``e^(2n) h0``; afterwards the ball lies in its own dent."""
+    radius, height, restitution = 0.005, 0.05, 0.7
+    world = make_world(
+        [[0.0, 0.0, radius + height]],
+        radius,
+        material=SAND | {"young": 1e8},
+        restitution=restitution,
+        friction=0.0,
+        gravity=[0.0, 0.0, -9.81],
+        boundaries=floor(),
+        domain={"low": [-0.1, -0.1, -0.05], "high": [0.1, 0.1, 0.1]},
+        precision="single",
+        time_step=2e-6,
+    )
+    every = 100
+    history = record(world, round(0.45 / world.time_step / every), every)
+    z, time = history["position"][:, 0, 2] - radius, history["time"]
+    falls = np.sqrt(2.0 * height / 9.81)
+    ends = falls * (1.0 + 2.0 * np.cumsum(restitution ** np.arange(1, 4)))
+    for n, (begin, end) in enumerate(zip([falls, *ends[:-1]], ends, strict=True), start=1):
+        during = (time > begin) & (time < end)
+        assert z[during].max() == pytest.approx(restitution ** (2 * n) * height, rel=1e-2)
+    world.step(round(0.5 / world.time_step))
+    weight = 2650.0 * 4 / 3 * np.pi * radius**3 * 9.81
+    dent = (3.0 * weight * (1.0 - 0.3**2) / (4.0 * 1e8 * np.sqrt(radius))) ** (2.0 / 3.0)
+    assert radius - world.observe().grains.position[0, 2] == pytest.approx(dent, rel=1e-3)
+
+
+def gas(number=60, seed=0):
+    """Grains of three sizes flying into each other in free space."""
+    random = np.random.default_rng(seed)
+    side = int(np.ceil(number ** (1 / 3)))
+    lattice = np.stack(np.meshgrid(*[range(side)] * 3, indexing="ij"), -1).reshape(-1, 3)[:number]
+    radius = random.choice([0.002, 0.003, 0.004], number)
+    position = 0.009 * lattice + random.uniform(-4e-4, 4e-4, (number, 3))
+    inward = position.mean(axis=0) - position
+    return position, radius, 8.0 * inward + random.normal(0.0, 0.2, (number, 3)), random.normal(0.0, 30.0, (number, 3))
+
+
+def momenta(grains, density=2500.0):
+    mass = density * 4 / 3 * np.pi * grains.radius.astype(float)[:, None] ** 3
+    velocity, spin = grains.velocity.astype(float), grains.spin.astype(float)
+    linear = (mass * velocity).sum(axis=0)
+    turning = 0.4 * mass * grains.radius.astype(float)[:, None] ** 2 * spin
+    return linear, (np.cross(grains.position, mass * velocity) + turning).sum(axis=0), np.abs(mass * velocity).sum()
+
+
+@pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-11), ("single", 1e-5)])
+def test_isolated_grains_keep_their_momenta(make_world, precision, tolerance):
+    position, radius, velocity, spin = gas()
+    material = {"density": 2500.0, "young": 1e7, "poisson": 0.25}
+    domain = {"low": [-0.2] * 3, "high": [0.25] * 3}
+    world = make_world(position, radius, velocity=velocity, spin=spin, material=material, domain=domain, precision=precision)
+    before, turning_before, scale = momenta(world.observe().grains)
+    world.step(3000)
+    observation = world.observe()
+    after, turning_after, _ = momenta(observation.grains)
+    assert observation.health.dissipated > 0.0
+    assert np.abs(after - before).max() < tolerance * scale
+    assert np.abs(turning_after - turning_before).max() < tolerance * scale * 0.05
+
+
+def test_elastic_frictionless_gas_keeps_its_energy(make_world):
+    position, radius, velocity, _ = gas(seed=5)
+    box = {"type": "box", "name": "box", "material": "wall", "low": [-0.01] * 3, "high": [0.05] * 3}
+    world = make_world(
+        position,
+        radius,
+        velocity=velocity,
+        restitution=1.0,
+        friction=0.0,
+        contact={"tangential": "none"},
+        boundaries=[box],
+    )
+    start = world.observe().health
+    world.step(round(0.1 / world.time_step))
+    health = world.observe().health
+    assert health.contacts + health.deepest > 0
+    total = start.kinetic + start.elastic
+    assert abs(health.kinetic + health.elastic - total) < 5e-5 * total
+
+
+def test_floor_carries_the_weight(make_world):
+    """A wide bed at rest between frictionless side walls."""
+    random = np.random.default_rng(2)
+    lattice = np.stack(np.meshgrid(range(8), range(8), range(6), indexing="ij"), -1).reshape(-1, 3)
+    position = 0.0105 * lattice + 0.00525 + random.uniform(-2e-4, 2e-4, (len(lattice), 3))
+    box = {"type": "box", "name": "box", "material": "wall", "low": [0.0] * 3, "high": [0.084, 0.084, 0.2], "open": ["top"]}
+    parsed = {
+        "material": SAND,
+        "restitution": 0.1,
+        "friction": 0.0,
+        "gravity": [0.0, 0.0, -9.81],
+        "boundaries": [box],
+        "precision": "single",
+    }
+    world = make_world(position, 0.005, **parsed)
+    world.step(round(1.5 / world.time_step))
+    observation = world.observe()
+    weight = observation.grains.mass.sum() * 9.81
+    assert -observation.wall("box/bottom").force[2] == pytest.approx(weight, rel=1e-3)
+    assert observation.health.retired == 0
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_same_bits_on_any_number_of_threads(make_world, threads):
+    """Grains, contact lists and sums are the same to the bit, also when searches come in between."""
+    digests = []
+    for lanes in (1, threads):
+        position, radius, velocity, spin = gas(120, seed=9)
+        world = make_world(position, radius, velocity=velocity, spin=spin, precision="single", threads=lanes)
+        world.step(2500)
+        observation = world.observe()
+        health = observation.health
+        digests.append((observation.grains, (health.kinetic, health.elastic, health.contacts)))
+    (one, sums), (many, sums_of_many) = digests
+    for name in ("identity", "position", "velocity", "spin"):
+        assert np.array_equal(getattr(one, name), getattr(many, name))
+    assert sums == sums_of_many
+
+
+def test_far_from_the_origin_the_bits_are_the_same(make_world):
+    """A scene moved by more than 10 km moves by more than 10 km."""
+    position, radius, velocity, spin = gas(30, seed=4)
+    position = np.round(position * 2.0**30) / 2.0**30  # exact in double precision there, too
+    found = []
+    for shift in (np.zeros(3), np.array([8192.0, -8192.0, 4096.0])):
+        domain = {"low": (shift - 0.125).tolist(), "high": (shift + 0.125).tolist()}
+        world = make_world(position + shift, radius, velocity=velocity, spin=spin, domain=domain, precision="single")
+        world.step(1500)
+        found.append(world.observe().grains)
+        assert np.abs(found[-1].position - shift - position).max() > 1e-3
+    assert np.array_equal(found[0].velocity, found[1].velocity)
+    assert np.array_equal(found[0].spin, found[1].spin)
