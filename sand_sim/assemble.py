@@ -15,12 +15,12 @@ from sand_sim.contact.response import ContactModel
 from sand_sim.engine.arrays import DemArrays, Setting
 from sand_sim.engine.device import open_device
 from sand_sim.engine.explicit_dem import ExplicitDem
-from sand_sim.engine.grains import GrainTable
 from sand_sim.engine.lattice import Lattice
-from sand_sim.engine.precision import PRECISIONS, Precision
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.surfaces import CYLINDER, PLANE, surface_type
 from sand_sim.engine.tool_body import ToolBody
+from sand_sim.grain_table import GrainTable
+from sand_sim.precision import PRECISIONS, Precision
 from sand_sim.scene.filling import fill_grains
 from sand_sim.scene.time_step import TimeStep, choose_time_step, effective_shear, effective_young, fastest_speed
 from sand_sim.scene.types import Scene, SceneError, Tool

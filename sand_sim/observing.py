@@ -49,7 +49,7 @@ def observe_tools(
     reports = []
     for index, (model, track) in enumerate(zip(assembly.tools, tracks, strict=True)):
         position, orientation = track.at(time)
-        moving = track.arriving_at(time)
+        moving = track.moving_at(time - 0.5 * assembly.time_step.value)
         back = rotation.inverse(orientation)
         force, torque = means[index]
         reports.append(

@@ -51,9 +51,9 @@ class Track:
         position = self.begin_position + self.velocity * passed
         return position, rotation.multiply(rotation.from_vector(self.spin * passed), self.begin_orientation)
 
-    def arriving_at(self, time: float) -> bool:
-        """Whether the tool was on its way just before a time [s]."""
-        return self.begin_time < time <= self.end_time
+    def moving_at(self, time: float) -> bool:
+        """Whether the tool is on its way at a time [s]."""
+        return self.begin_time <= time < self.end_time
 
     @property
     def _duration(self) -> float:

@@ -5,7 +5,7 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.engine.precision import Precision
+from sand_sim.precision import Precision
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import warp as wp
 
 from sand_sim.contact.contact import contact_types
-from sand_sim.engine.precision import Precision
+from sand_sim.precision import Precision
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import warp as wp
 from sand_sim.contact.contact import contact_types
 from sand_sim.contact.normal import NORMAL_LAWS
 from sand_sim.contact.tangential import TANGENTIAL_LAWS
-from sand_sim.engine.precision import Precision
+from sand_sim.precision import Precision
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,13 @@ from sand_sim.engine.cells import prepare_cells
 from sand_sim.engine.contact_list import ContactList
 from sand_sim.engine.count import Count
 from sand_sim.engine.flags import Flags
-from sand_sim.engine.grains import Grains, GrainTable
+from sand_sim.engine.grains import Grains
 from sand_sim.engine.lattice import Lattice
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.sorting import SortedItems
 from sand_sim.engine.surfaces import surface_type
 from sand_sim.engine.tool_body import ToolBody, Tools
+from sand_sim.grain_table import GrainTable
 
 _ROOM_TO_SPARE = 1.25
 _FIRST_PAIRS = 5  # room for contacts per grain to begin with

@@ -11,7 +11,7 @@ import warp as wp
 
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.lattice import Lattice
-from sand_sim.engine.precision import Precision
+from sand_sim.precision import Precision
 
 _CELLS_PER_GRAIN = 8
 _FEWEST_CELLS = 4096

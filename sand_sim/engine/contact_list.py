@@ -11,8 +11,8 @@ import warp as wp
 from sand_sim.engine.count import Count, share_out
 from sand_sim.engine.flags import FAULT_ROOM, Flags
 from sand_sim.engine.kernel import kernel
-from sand_sim.engine.precision import Precision
 from sand_sim.engine.sorting import record_running_totals
+from sand_sim.precision import Precision
 
 
 class ContactList:

@@ -5,8 +5,8 @@ from functools import cache
 import warp as wp
 
 from sand_sim.engine.kernel import kernel
-from sand_sim.engine.precision import Precision
 from sand_sim.engine.recipe import Recipe
+from sand_sim.precision import Precision
 
 BLOCK = 256  # items per partial sum
 

@@ -5,9 +5,9 @@ from functools import cache
 import warp as wp
 
 from sand_sim.engine.kernel import kernel
-from sand_sim.engine.precision import Precision
 from sand_sim.engine.tool_contacts import SUM_BLOCK
 from sand_sim.engine.tools import ToolTrack, build_tool_state_at, tool_types
+from sand_sim.precision import Precision
 
 
 @cache

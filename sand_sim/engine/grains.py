@@ -1,47 +1,12 @@
 """The grains of a world as arrays on the device."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import warp as wp
 
 from sand_sim.engine.count import Count
 from sand_sim.engine.lattice import Lattice
 from sand_sim.engine.recipe import Recipe
-
-
-@dataclass(frozen=True)
-class GrainTable:
-    """Grains on the host, one row each, as the scene gives them or a snapshot keeps them.
-
-    Attributes:
-        position: world frame, shape (n, 3) [m].
-        velocity: shape (n, 3) [m/s].
-        spin: shape (n, 3) [rad/s], world frame.
-        radius: shape (n,) [m].
-        density: shape (n,) [kg/m^3].
-        material: index into the scene's materials, shape (n,), int.
-    """
-
-    position: np.ndarray
-    velocity: np.ndarray
-    spin: np.ndarray
-    radius: np.ndarray
-    density: np.ndarray
-    material: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.radius)
-
-    @property
-    def mass(self) -> np.ndarray:
-        """Masses of solid spheres, shape (n,) [kg]."""
-        return self.density * 4.0 / 3.0 * np.pi * self.radius**3
-
-    @classmethod
-    def join(cls, tables: list["GrainTable"]) -> "GrainTable":
-        """One table after the other."""
-        return cls(*(np.concatenate([getattr(t, name) for t in tables]) for name in cls.__dataclass_fields__))
+from sand_sim.grain_table import GrainTable
 
 
 class Grains:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sand_sim.engine.precision import Precision
+from sand_sim.precision import Precision
 
 
 @dataclass(frozen=True)

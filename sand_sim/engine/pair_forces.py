@@ -8,8 +8,8 @@ from sand_sim.contact.contact import contact_types
 from sand_sim.contact.response import build_meeting
 from sand_sim.engine.act import build_act
 from sand_sim.engine.kernel import kernel
-from sand_sim.engine.precision import Precision
 from sand_sim.engine.recipe import Recipe
+from sand_sim.precision import Precision
 
 
 @cache

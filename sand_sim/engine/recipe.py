@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from sand_sim.contact.response import ContactModel
-from sand_sim.engine.precision import SINGLE, Precision
+from sand_sim.precision import SINGLE, Precision
 
 
 @dataclass(frozen=True)

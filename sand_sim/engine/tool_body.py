@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from sand_sim.engine.precision import Precision
 from sand_sim.engine.tools import ToolTrack, tool_types
+from sand_sim.precision import Precision
 
 
 @dataclass(frozen=True)

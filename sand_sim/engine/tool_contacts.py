@@ -14,9 +14,9 @@ from sand_sim.engine.act import build_act
 from sand_sim.engine.contact_list import listed_at
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.pair_forces import build_direction
-from sand_sim.engine.precision import Precision
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.tools import tool_types
+from sand_sim.precision import Precision
 
 SUM_BLOCK = 128  # contacts per partial sum of a wrench; fixed, so that the sum does not depend on the number of lanes
 

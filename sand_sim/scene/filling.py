@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sand_sim.engine.grains import GrainTable
+from sand_sim.grain_table import GrainTable
 from sand_sim.scene.types import Fill, Material, SceneError, SizeDistribution
 from sand_sim.scene.walls import Wall
 
@@ -118,11 +118,12 @@ def _read_positions(fill: Fill, material: Material, index: int) -> GrainTable:
     for name in ("position", "radius"):
         if name not in columns:
             raise SceneError(f"{where} has no '{name}'; it has {', '.join(columns) or 'nothing'}")
-    position = np.asarray(columns["position"], float)
-    number = len(position)
-    radius = np.broadcast_to(np.asarray(columns["radius"], float), number).copy() if number else np.zeros(0)
-    if position.ndim != 2 or position.shape[1] != 3 or not number:
+    position, radius = np.asarray(columns["position"], float), np.asarray(columns["radius"], float)
+    if position.ndim != 2 or position.shape[1] != 3 or not len(position):
         raise SceneError(f"{where}: 'position' must have shape (n, 3) with n > 0, got {position.shape}")
+    number = len(position)
+    if radius.shape != (number,):
+        raise SceneError(f"{where}: 'radius' must have shape ({number},), got {radius.shape}")
     table = _table(position, radius, fill, material, index)
     for name in ("velocity", "spin"):
         if name in columns:

@@ -7,7 +7,7 @@ import yaml
 
 from sand_sim.contact.normal import NORMAL_LAWS
 from sand_sim.contact.tangential import TANGENTIAL_LAWS
-from sand_sim.engine.precision import PRECISIONS
+from sand_sim.precision import PRECISIONS
 from sand_sim.scene.checking import check_scene
 from sand_sim.scene.fields import Field
 from sand_sim.scene.types import (

@@ -9,7 +9,14 @@ OXIDE = {"density": 4000.0, "young": 380e9, "poisson": 0.23}
 
 @pytest.mark.parametrize(
     ("angle", "expected", "omega"),
-    [(30, 0.6845, 615.3), (35, 0.7398, 582.0), (40, 0.7829, 544.2), (45, 0.8178, 502.4), (60, 0.8948, 355.2), (80, 0.9679, 123.4)],
+    [
+        (30, 0.6845, 615.3),
+        (35, 0.7398, 582.0),
+        (40, 0.7829, 544.2),
+        (45, 0.8178, 502.4),
+        (60, 0.8948, 355.2),
+        (80, 0.9679, 123.4),
+    ],
 )
 def test_oblique_impact_while_sliding(make_world, angle, expected, omega):
     """Chung & Ooi 2011, T4: tangential restitution and spin of a sphere that slides through its impact on a rigid plane."""

@@ -1,4 +1,4 @@
-"""An independent DEM in NumPy, float64, all pairs: the yardstick for the kernels. Written from the equations, not from the code."""
+"""An independent DEM in NumPy, float64, all pairs: the yardstick for the kernels, written from the equations."""
 
 import numpy as np
 

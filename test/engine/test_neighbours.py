@@ -1,0 +1,86 @@
+"""Neighbour lists against brute force, their growth, and grains that leave."""
+
+import numpy as np
+import pytest
+
+
+def cloud(number, radius, edge, seed):
+    """Grains strewn at random, overlapping as it comes."""
+    random = np.random.default_rng(seed)
+    return random.uniform(0.0, edge, (number, 3)), radius(random, number)
+
+
+SIZES = {
+    "one size": lambda random, n: np.full(n, 0.003),
+    "two sizes": lambda random, n: random.choice([0.002, 0.005], n),
+    "ratio of twenty": lambda random, n: np.where(random.random(n) < 0.02, 0.02, random.uniform(0.001, 0.003, n)),
+}
+
+
+def listed_pairs(world):
+    """Pairs on the list by identity, and how often the whole list names a pair twice."""
+    arrays = world.assembly.solver.arrays
+    number = arrays.pair_list.pairs.get()
+    identity = arrays.grains.identity.numpy()
+    pairs = identity[np.column_stack([arrays.pair_list.owner.numpy()[:number], arrays.pair_list.partner.numpy()[:number]])]
+    return np.unique(np.sort(pairs, axis=1), axis=0), number
+
+
+@pytest.mark.parametrize("sizes", SIZES)
+@pytest.mark.parametrize("threads", [1, 2])
+def test_every_pair_within_reach_is_listed_once(make_world, sizes, threads):
+    position, radius = cloud(700, SIZES[sizes], 0.08, seed=1)
+    world = make_world(position, radius, skin=1e-3, precision="single", threads=threads, contact={"tangential": "none"})
+    found, number = listed_pairs(world)
+    distance = np.linalg.norm(position[:, None] - position[None], axis=2)
+    reach = radius[:, None] + radius[None] + 1e-3
+    a, b = np.nonzero(np.triu(distance < reach - 1e-8, k=1))
+    possible = np.triu(distance < reach + 1e-8, k=1)
+    assert len(found) == number
+    assert {tuple(pair) for pair in np.column_stack([a, b])} <= {tuple(pair) for pair in found}
+    assert possible[found[:, 0], found[:, 1]].all()
+
+
+def test_lists_grow_and_nothing_is_dropped(make_world):
+    """Far more contacts than the first room: the list is enlarged and complete."""
+    position, radius = cloud(400, SIZES["one size"], 0.012, seed=2)
+    world = make_world(position, radius, skin=5e-4, precision="single", contact={"tangential": "none"})
+    arrays = world.assembly.solver.arrays
+    found, number = listed_pairs(world)
+    distance = np.linalg.norm(position[:, None] - position[None], axis=2)
+    assert number > 5 * len(position)
+    assert arrays.pair_list.pairs.capacity >= number
+    assert abs(len(found) - np.triu(distance < 0.0065, k=1).sum()) <= 1
+
+
+def test_history_survives_renumbering(make_world):
+    """A loaded contact keeps its spring when other grains force a new search and a new numbering."""
+    position = np.array([[0.0, 0.0, 0.005], [0.0, 0.0, 0.0148], [0.03, 0.0, 0.005], [0.05, 0.0, 0.005]])
+    velocity = np.array([[0.0, 0.0, 0.0], [0.02, 0.0, -0.05], [0.0, 0.0, 0.0], [-2.0, 0.0, 0.0]])
+    found = []
+    for skin in (1e-4, 5e-2):  # many searches, and one
+        world = make_world(position, 0.005, velocity=velocity, skin=skin, time_step=2e-5, friction=0.9, restitution=0.4)
+        world.step(450)
+        found.append(world.observe().grains)
+    assert np.abs(found[0].spin).max() > 1.0
+    assert np.abs(found[0].position - found[1].position).max() < 1e-12
+    assert np.abs(found[0].spin - found[1].spin).max() < 1e-8
+
+
+def test_grains_that_leave_are_counted_and_retired(make_world):
+    position, radius = cloud(60, SIZES["two sizes"], 0.2, seed=3)
+    velocity = 20.0 * (position - 0.1)
+    domain = {"low": [-0.05] * 3, "high": [0.25] * 3}
+    world = make_world(position, radius, velocity=velocity, domain=domain, precision="single", contact={"tangential": "none"})
+    alive = []
+    for _ in range(30):
+        world.step(400)
+        observation = world.observe()
+        alive.append(len(observation.grains))
+        assert np.all(np.isfinite(observation.grains.position))
+        assert np.all(np.abs(observation.grains.position - 0.1) <= 0.15 + 1e-9)
+    assert alive[0] > alive[-1]
+    world.step(10)
+    observation = world.observe()
+    assert observation.health.retired == 60 - len(observation.grains)
+    assert np.array_equal(np.unique(observation.grains.identity), observation.grains.identity)

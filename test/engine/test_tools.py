@@ -1,0 +1,138 @@
+"""Tools: forces, true velocities, momentum, and that moving one rebuilds nothing but its own list."""
+
+import numpy as np
+import pytest
+import trimesh
+from scenes import SceneMaker
+
+from sand_sim import CommandError, ToolPose, World, read_scene
+
+GRAIN = {"density": 2500.0, "young": 1e7, "poisson": 0.25}
+NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+@pytest.fixture
+def make_plate_world(tmp_path):
+    """A world with grains and a plate, 60 x 60 x 4 mm, whose upper face is at z = 0 of its frame."""
+
+    def make(position, radius=0.005, particle_radius=0.002, pose=None, **further):
+        mesh = trimesh.creation.box((0.06, 0.06, 0.004))
+        mesh.apply_translation([0.0, 0.0, -0.002])
+        mesh.export(tmp_path / "plate.stl")
+        maker = SceneMaker(tmp_path)
+        tools = {
+            "plate": {"mesh": "plate.stl", "material": "wall", "particle_radius": particle_radius, "max_speed": 5.0}
+            | (pose or {})
+        }
+        further = {"material": GRAIN, "wall": GRAIN, "domain": {"low": [-0.2] * 3, "high": [0.2] * 3}} | further
+        return World(read_scene(maker.scene(position, radius, tools=tools, **further), tmp_path))
+
+    return make
+
+
+def test_tool_carries_a_resting_grain(make_plate_world):
+    world = make_plate_world([[0.0, 0.0, 0.0072]], gravity=[0.0, 0.0, -9.81], restitution=0.2, friction=0.8)
+    world.step(round(0.6 / world.time_step))
+    world.observe()
+    world.step(200)
+    observation = world.observe()
+    weight = float(observation.grains.mass[0]) * 9.81
+    report = observation.tool("plate")
+    assert report.force[2] == pytest.approx(-weight, rel=1e-3)
+    assert np.abs(report.world_force[:2]).max() < 1e-2 * weight
+    x, y, _ = observation.grains.position[0]
+    assert report.torque == pytest.approx([-weight * y, weight * x, 0.0], abs=2e-3 * weight * 0.03)
+
+
+@pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-9), ("single", 2e-6)])
+def test_force_times_time_is_momentum_given(make_plate_world, precision, tolerance):
+    random = np.random.default_rng(1)
+    position = np.column_stack([random.uniform(-0.02, 0.02, (6, 2)), 0.0076 + 0.0105 * np.arange(6)])
+    world = make_plate_world(position, velocity=[0.0, 0.0, -0.5], precision=precision)
+    before = world.observe().grains
+    world.step(1500)
+    after = world.observe()
+    gained = (after.grains.mass[:, None].astype(float) * (after.grains.velocity - before.velocity)).sum(axis=0)
+    impulse = -after.tool("plate").world_force * after.time
+    assert np.abs(gained).max() > 0.0
+    assert np.abs(impulse - gained).max() < tolerance * np.abs(before.mass * before.velocity[:, 2]).sum()
+
+
+def test_particles_carry_the_tools_velocity(make_plate_world):
+    """A rising plate throws a resting grain to (1 + e) times its own speed."""
+    world = make_plate_world([[0.0, 0.0, 0.015]], restitution=0.7, friction=0.0, contact={"tangential": "none"})
+    world.apply(ToolPose("plate", np.array([0.0, 0.0, 0.02]), NO_TURN, 0.04))
+    world.step(round(0.035 / world.time_step))
+    velocity = world.observe().grains.velocity[0]
+    assert np.linalg.norm(velocity) == pytest.approx(1.7 * 0.5, rel=0.15)  # less the roughness of the particles
+    assert velocity[2] > 0.6
+
+
+def test_turning_tool_carries_grains_round(make_plate_world):
+    """A grain on a turning plate is dragged along until it turns with the plate."""
+    world = make_plate_world([[0.015, 0.0, 0.0072]], gravity=[0.0, 0.0, -9.81], restitution=0.2, friction=1.0)
+    world.step(round(0.3 / world.time_step))
+    turn, rate = world.time, 1.0
+    for k in range(1, 31):
+        angle = 0.5 * rate * 0.02 * k
+        quaternion = np.array([0.0, 0.0, np.sin(angle), np.cos(angle)])
+        world.apply(ToolPose("plate", np.zeros(3), quaternion, turn + 0.02 * k))
+        world.step(round((turn + 0.02 * k - world.time) / world.time_step))
+    observation = world.observe()
+    x, y, _ = observation.grains.position[0]
+    assert np.arctan2(y, x) == pytest.approx(0.6, abs=0.15)
+    assert observation.tool("plate").spin == pytest.approx([0.0, 0.0, rate], abs=1e-6)
+
+
+def test_moving_tool_rebuilds_only_its_own_list(make_plate_world):
+    world = make_plate_world([[0.0, 0.0, 0.1]], precision="single")
+    grains = world.assembly.solver.arrays.grains
+    world.step(10)
+    grains.origin.fill_(0)  # would be written anew by a search among grains
+    world.assembly.solver.arrays.flags.grains_moved.zero_()
+    grains.origin.assign(grains.place)
+    before = grains.origin.numpy().copy()
+    world.apply(ToolPose("plate", np.array([0.05, 0.0, 0.0]), NO_TURN, world.time + 0.05))
+    world.step(500)
+    assert float(world.assembly.solver.arrays.tools.travelled.numpy()[0]) < 0.5 * world.assembly.solver.arrays.setting.skin
+    assert np.array_equal(grains.origin.numpy(), before)
+
+
+@pytest.mark.parametrize(
+    ("command", "reason"),
+    [
+        (ToolPose("spade", np.zeros(3), NO_TURN, 1.0), "unknown_tool"),
+        (ToolPose("plate", np.array([np.nan, 0.0, 0.0]), NO_TURN, 1.0), "not_finite"),
+        (ToolPose("plate", np.zeros(3), np.array([0.0, 0.0, 0.0, np.inf]), 1.0), "not_finite"),
+        (ToolPose("plate", np.zeros(3), np.zeros(4), 1.0), "zero_quaternion"),
+        (ToolPose("plate", np.zeros(3), NO_TURN, 0.0), "late"),
+        (ToolPose("plate", np.array([1.0, 0.0, 0.0]), NO_TURN, 0.01), "too_fast"),
+    ],
+)
+def test_bad_commands_are_rejected_and_change_nothing(make_plate_world, command, reason):
+    world = make_plate_world([[0.0, 0.0, 0.05]])
+    before = world.save()
+    with pytest.raises(CommandError) as caught:
+        world.apply(command)
+    assert caught.value.reason == reason
+    assert command.tool in str(caught.value)
+    after = world.save()
+    assert all(np.array_equal(before[name], after[name]) for name in before)
+
+
+def test_saved_state_goes_on_to_the_bit(make_plate_world):
+    position = np.column_stack([np.linspace(-0.02, 0.02, 9), np.zeros(9), np.linspace(0.008, 0.09, 9)])
+    common = {"gravity": [0.0, 0.0, -9.81], "precision": "single"}
+    world = make_plate_world(position, **common)
+    world.apply(ToolPose("plate", np.array([0.01, 0.0, 0.01]), NO_TURN, 0.2))
+    world.step(2000)
+    saved = world.save()
+    world.step(3000)
+    expected = world.save()
+    other = make_plate_world(position, threads=1, **common)
+    other.restore(saved)
+    other.step(3000)
+    found = other.save()
+    assert all(expected[name].tobytes() == found[name].tobytes() for name in expected)
+    world.reset()
+    assert world.time == 0.0

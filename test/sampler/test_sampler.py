@@ -1,0 +1,152 @@
+"""From meshes to particle bodies."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from sampler import MeshError, SignedDistance, locate_mesh, read_mesh, sample_body
+
+MESHES = Path(__file__).parents[2] / "config" / "meshes"
+BUCKET = MESHES / "bucket.stl"
+
+
+def nearest_neighbours(points):
+    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+    np.fill_diagonal(distance, np.inf)
+    return distance.min(axis=1)
+
+
+def farthest_from_particles(mesh, points, samples=4000):
+    """Largest distance of surface points from the nearest particle."""
+    surface, _ = trimesh.sample.sample_surface(mesh, samples, seed=1)
+    return max(np.linalg.norm(part[:, None] - points[None], axis=2).min(axis=1).max() for part in np.array_split(surface, 20))
+
+
+@pytest.fixture(scope="module")
+def sphere():
+    return trimesh.creation.icosphere(subdivisions=4, radius=0.05)
+
+
+@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "dae"])
+def test_meshes_are_read(tmp_path, kind):
+    path = tmp_path / f"box.{kind}"
+    trimesh.creation.box((100.0, 60.0, 20.0)).export(path)
+    mesh = read_mesh(path, scale=0.001)
+    assert mesh.extents == pytest.approx([0.1, 0.06, 0.02])
+    assert mesh.volume == pytest.approx(0.1 * 0.06 * 0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("empty.stl", b"", "mesh empty.stl"),
+        ("text.obj", b"hello\n", "mesh text.obj"),
+        ("points.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "mesh points.obj"),
+        ("pointer.stl", b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n", "is a Git LFS pointer"),
+        ("nan.obj", b"v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "mesh nan.obj"),
+        ("flat.obj", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "mesh flat.obj"),
+        ("what.xyz123", b"?", "mesh what.xyz123: cannot be read"),
+    ],
+)
+def test_bad_meshes_are_refused(tmp_path, name, content, reason):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(MeshError) as caught:
+        read_mesh(tmp_path / name)
+    assert reason in str(caught.value)
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, float("nan")])
+def test_bad_scale_is_refused(scale):
+    with pytest.raises(MeshError, match="scale must be positive"):
+        read_mesh(BUCKET, scale)
+
+
+def test_meshes_are_found_by_address(tmp_path, monkeypatch):
+    share = tmp_path / "share" / "my_robot" / "meshes"
+    share.mkdir(parents=True)
+    (share / "a tool.stl").write_bytes(BUCKET.read_bytes())
+    monkeypatch.setenv("AMENT_PREFIX_PATH", os.pathsep.join(["/nowhere", str(tmp_path)]))
+    expected = share / "a tool.stl"
+    assert locate_mesh("package://my_robot/meshes/a%20tool.stl") == expected
+    assert locate_mesh(f"file://{expected}".replace(" ", "%20")) == expected
+    assert locate_mesh(str(expected)) == expected
+    assert locate_mesh("meshes/a tool.stl", share.parent) == expected
+
+
+@pytest.mark.parametrize(
+    ("address", "reason"),
+    [
+        ("package://no_such_package/mesh.stl", "no ROS package 'no_such_package'"),
+        ("https://example.org/mesh.stl", "unknown scheme 'https://'"),
+        ("missing.stl", "there is no file"),
+        ("file:///missing.stl", "there is no file"),
+    ],
+)
+def test_addresses_that_lead_nowhere_are_refused(address, reason):
+    with pytest.raises(MeshError) as caught:
+        locate_mesh(address)
+    assert reason in str(caught.value)
+
+
+def test_distance_is_exact_and_negative_inside(sphere):
+    box = trimesh.creation.box((0.2, 0.1, 0.06))
+    random = np.random.default_rng(0)
+    points = random.uniform(-0.15, 0.15, (2000, 3))
+    half = np.array([0.1, 0.05, 0.03])
+    out = np.abs(points) - half
+    exact = np.linalg.norm(np.maximum(out, 0.0), axis=1) + np.minimum(out.max(axis=1), 0.0)
+    distance, closest, normal = SignedDistance(box).query(points)
+    assert np.abs(distance - exact).max() < 1e-7
+    assert np.abs(np.linalg.norm(points - closest, axis=1) - np.abs(exact)).max() < 1e-7
+    assert np.linalg.norm(normal, axis=1) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_particles_are_even_and_on_the_surface(sphere):
+    body = sample_body(sphere, radius=0.004)
+    spacing = nearest_neighbours(body.points) / body.spacing
+    assert np.abs(np.linalg.norm(body.points, axis=1) - 0.05).max() < 2e-4  # the mesh is a polyhedron
+    assert spacing.std() / spacing.mean() < 0.06
+    assert spacing.min() > 0.75
+    assert spacing.max() < 1.15
+    assert farthest_from_particles(sphere, body.points) < 0.85 * body.spacing
+
+
+def test_bucket_is_covered_so_that_no_grain_passes():
+    mesh = read_mesh(BUCKET)
+    body = sample_body(mesh, radius=0.004)
+    # A grain of radius r passes a gap in which no particle is nearer than its own radius plus r.
+    assert farthest_from_particles(mesh, body.points) < body.radius + 0.003
+
+
+def test_mass_properties_of_a_box():
+    box = trimesh.creation.box((0.2, 0.1, 0.06))
+    box.apply_translation([0.1, 0.2, 0.3])
+    body = sample_body(box, radius=0.01)
+    volume = 0.2 * 0.1 * 0.06
+    assert body.volume == pytest.approx(volume, rel=1e-12)
+    assert body.centre == pytest.approx([0.1, 0.2, 0.3])
+    expected = volume / 12.0 * np.diag([0.1**2 + 0.06**2, 0.2**2 + 0.06**2, 0.2**2 + 0.1**2])
+    assert body.inertia == pytest.approx(expected, rel=1e-9, abs=1e-15)
+
+
+def test_open_mesh_has_no_mass(sphere):
+    half = sphere.copy()
+    half.update_faces(half.triangles_center[:, 2] > 0.0)
+    assert np.isnan(sample_body(half, radius=0.004).volume)
+
+
+def test_same_seed_same_body(sphere):
+    first, second, third = (sample_body(sphere, radius=0.008, seed=seed).points for seed in (0, 0, 1))
+    assert np.array_equal(first, second)
+    assert not np.array_equal(first, third)
+
+
+@pytest.mark.parametrize(
+    ("radius", "reason"), [(0.0, "must be positive"), (-1.0, "must be positive"), (1e-6, "check the mesh's scale")]
+)
+def test_radii_that_make_no_sense_are_refused(sphere, radius, reason):
+    with pytest.raises(MeshError, match=reason):
+        sample_body(sphere, radius=radius)

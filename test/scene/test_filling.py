@@ -1,0 +1,149 @@
+"""How grains get into a scene."""
+
+import numpy as np
+import pytest
+from scenes import SceneMaker
+
+from sand_sim import SceneError, World, read_scene
+from sand_sim.scene.filling import fill_grains
+from sand_sim.scene.types import Fill, Material, SizeDistribution
+from sand_sim.scene.walls import Wall
+
+SAND = Material("sand", 2600.0, 1e7, 0.25)
+
+
+def fill(**further):
+    given = {"size": SizeDistribution("constant", mean=0.005), "low": (0.0, 0.0, 0.0), "high": (0.2, 0.1, 0.1)}
+    return Fill("bed", "sand", **(given | further))
+
+
+def nearest(position):
+    distance = np.linalg.norm(position[:, None] - position[None], axis=2)
+    return distance[~np.eye(len(position), dtype=bool)].min()
+
+
+def test_count_and_region_are_kept():
+    table = fill_grains(fill(count=500), SAND, 0, [])
+    assert len(table) == 500
+    assert np.all(table.position >= 0.005 - 1e-12)
+    assert np.all(table.position <= np.array([0.195, 0.095, 0.095]) + 1e-12)
+    assert nearest(table.position) > 0.01 * (1.0 - 1e-9)
+
+
+def test_seed_decides():
+    tables = [fill_grains(fill(count=100, seed=seed), SAND, 0, []) for seed in (1, 1, 2)]
+    assert np.array_equal(tables[0].position, tables[1].position)
+    assert not np.array_equal(tables[0].position, tables[2].position)
+
+
+@pytest.mark.parametrize(
+    ("size", "low", "high", "mean"),
+    [
+        (SizeDistribution("uniform", low=0.003, high=0.005), 0.003, 0.005, 0.004),
+        (SizeDistribution("normal", mean=0.004, deviation=0.0004, low=0.0035, high=0.0045), 0.0035, 0.0045, 0.004),
+        (SizeDistribution("table", radii=(0.003, 0.005), weights=(3.0, 1.0)), 0.003, 0.005, 0.0035),
+    ],
+)
+def test_sizes_follow_their_distribution(size, low, high, mean):
+    radius = fill_grains(fill(size=size, count=1000, high=(0.2, 0.2, 0.2)), SAND, 0, []).radius
+    assert low <= radius.min() < radius.max() <= high
+    assert radius.mean() == pytest.approx(mean, rel=0.02)
+
+
+def test_grains_keep_clear_of_walls():
+    cylinder = Wall("cylinder", "pipe", "steel", np.array([0.1, 0.05, 0.0]), np.array([0.0, 0.0, 1.0]), 0.045)
+    table = fill_grains(fill(count=100), SAND, 0, [cylinder])
+    assert np.all(cylinder.distance(table.position) >= 0.005)
+
+
+def test_too_many_grains_are_refused():
+    with pytest.raises(SceneError, match=r"'bed' has room for \d+ loosely packed grains but 100000 are wanted"):
+        fill_grains(fill(count=100_000), SAND, 0, [])
+
+
+def settled(tmp_path, fills, boundaries):
+    maker = SceneMaker(tmp_path)
+    scene = maker.scene([[0.0, 0.0, 0.0]], 0.005, gravity=[0.0, 0.0, -9.81], precision="single", restitution=0.3)
+    scene |= {"fills": fills, "boundaries": boundaries, "settle": {"time": 0.6, "speed": 0.02}}
+    return World(read_scene(scene, tmp_path))
+
+
+def test_bed_filled_by_height_has_that_height(tmp_path):
+    region = {"low": [0.0, 0.0, 0.0], "high": [0.12, 0.12, 0.2]}
+    bed = {"material": "grain", "radius": {"uniform": [0.0045, 0.0055]}, "region": region, "height": 0.05}
+    box = {"type": "box", "material": "wall", "open": ["top"]} | region
+    world = settled(tmp_path, [bed], [box])
+    grains = world.observe().grains
+    top = grains.position[:, 2] + grains.radius
+    assert top.max() <= 0.05 + 1e-9
+    columns = np.floor(grains.position[:, :2] / 0.03).astype(int)
+    surface = [top[(columns == cell).all(axis=1)].max() for cell in np.unique(columns, axis=0)]
+    assert min(surface) > 0.05 - 0.012
+    assert world.time == 0.0
+    assert world.observe().health.retired == 0
+
+
+def test_two_materials_lie_together(tmp_path):
+    """Grains of two materials and densities; both are listed and weigh what they should."""
+    region = {"low": [0.0, 0.0, 0.0], "high": [0.06, 0.06, 0.1]}
+    fills = [
+        {"material": "grain", "radius": 0.005, "region": region | {"high": [0.06, 0.06, 0.05]}, "count": 40},
+        {"material": "wall", "radius": 0.004, "region": region | {"low": [0.0, 0.0, 0.05]}, "count": 30},
+    ]
+    scene = SceneMaker(tmp_path).scene([[0.0, 0.0, 0.0]], 0.005, gravity=[0.0, 0.0, -9.81], precision="single")
+    scene["materials"]["wall"] = {"density": 7800.0, "young": 5e7, "poisson": 0.3}
+    scene["pairs"].append({"between": ["wall", "wall"], "restitution": 0.3, "friction": 0.2})
+    scene |= {"fills": fills, "boundaries": [{"type": "box", "name": "box", "material": "wall", "open": ["top"]} | region]}
+    world = World(read_scene(scene, tmp_path))
+    world.step(round(0.8 / world.time_step))
+    observation = world.observe()
+    mass = 40 * 2500.0 * 4 / 3 * np.pi * 0.005**3 + 30 * 7800.0 * 4 / 3 * np.pi * 0.004**3
+    assert observation.grains.mass.sum() == pytest.approx(mass, rel=1e-5)
+    force = -sum(wall.force for wall in observation.walls)
+    assert force[2] == pytest.approx(mass * 9.81, rel=0.02)
+    assert observation.health.retired == 0
+
+
+@pytest.mark.parametrize("kind", ["npz", "csv"])
+def test_positions_come_from_files(tmp_path, kind):
+    position, radius = np.array([[0.01, 0.02, 0.03], [0.05, 0.02, 0.03]]), np.array([0.004, 0.005])
+    velocity = np.array([[0.0, 0.0, 1.0], [2.0, 0.0, 0.0]])
+    path = tmp_path / f"grains.{kind}"
+    if kind == "npz":
+        np.savez(path, position=position, radius=radius, velocity=velocity)
+    else:
+        rows = np.column_stack([position, radius, velocity])
+        np.savetxt(path, rows, delimiter=",", header="x,y,z,radius,vx,vy,vz", comments="")
+    table = fill_grains(Fill("bed", "sand", file=path), SAND, 0, [])
+    assert table.position == pytest.approx(position)
+    assert table.radius == pytest.approx(radius)
+    assert table.velocity == pytest.approx(velocity)
+
+
+@pytest.mark.parametrize(
+    ("columns", "named"),
+    [
+        ({"radius": np.ones(2)}, "has no 'position'"),
+        ({"position": np.ones((2, 2)), "radius": np.ones(2)}, "must have shape (n, 3)"),
+        ({"position": np.full((2, 3), np.nan), "radius": np.ones(2)}, "'position' has values that are not finite"),
+        ({"position": np.ones((2, 3)), "radius": -np.ones(2)}, "'radius' must be positive"),
+        ({"position": np.ones((2, 3)), "radius": np.ones(3)}, "'radius' must have shape (2,)"),
+        ({"position": np.ones((2, 3)), "radius": np.ones(2), "velocity": np.ones((3, 3))}, "'velocity' must have shape (2, 3)"),
+    ],
+)
+def test_bad_position_files_are_refused(tmp_path, columns, named):
+    np.savez(tmp_path / "grains.npz", **columns)
+    with pytest.raises(SceneError) as caught:
+        fill_grains(Fill("bed", "sand", file=tmp_path / "grains.npz"), SAND, 0, [])
+    assert named in str(caught.value)
+    assert "grains.npz" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"), [("grains.npz", "text"), ("grains.csv", "x,y,z,radius\n1,2,three,4\n"), ("none.csv", None)]
+)
+def test_unreadable_position_files_are_refused(tmp_path, name, content):
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    with pytest.raises(SceneError, match=name):
+        fill_grains(Fill("bed", "sand", file=tmp_path / name), SAND, 0, [])

@@ -1,0 +1,127 @@
+"""Scene files: what is read, and that every refusal names its field."""
+
+import copy
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from sand_sim import SceneError, load_scene, read_scene
+from sand_sim.config_folder import config_folder, find_scene
+
+GOOD = {
+    "materials": {
+        "sand": {"density": 2600, "young": "1e7", "poisson": 0.25},
+        "steel": {"density": 7800, "young": 1e9, "poisson": 0.3},
+    },
+    "pairs": [
+        {"between": ["sand", "sand"], "restitution": 0.5, "friction": 0.5},
+        {"between": ["steel", "sand"], "restitution": 0.4, "friction": 0.2},
+    ],
+    "fills": [{"material": "sand", "radius": 0.005, "region": {"low": [0, 0, 0], "high": [0.1, 0.1, 0.1]}, "count": 50}],
+    "boundaries": [{"type": "plane", "material": "steel", "point": [0, 0, 0], "normal": [0, 0, 2]}],
+    "tools": {"spade": {"mesh": "spade.stl", "material": "steel", "particle_radius": 0.002}},
+}
+
+
+def changed(path, value):
+    """The good scene with one entry replaced, added or (with None) taken away."""
+    parsed = copy.deepcopy(GOOD)
+    entry = parsed
+    for key in path[:-1]:
+        entry = entry[key]
+    if value is None:
+        del entry[path[-1]]
+    else:
+        entry[path[-1]] = value
+    return parsed
+
+
+def test_good_scene_is_read():
+    scene = read_scene(copy.deepcopy(GOOD), Path.cwd())
+    assert scene.materials[0].young == 1e7  # YAML reads 1e7 as text
+    assert scene.pair("sand", "steel").friction == 0.2
+    assert scene.gravity == (0.0, 0.0, -9.81)
+    assert scene.tool("spade").scale == 1.0
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "named"),
+    [
+        (("materials", "sand", "density"), -1.0, "materials.sand.density: must be greater than 0 [kg/m^3], got -1"),
+        (("materials", "sand", "poisson"), 0.7, "materials.sand.poisson: must be at least"),
+        (("materials", "sand", "young"), "stiff", "materials.sand.young: must be a number [Pa], got 'stiff'"),
+        (("materials", "sand", "yuong"), 1.0, "materials.sand: unknown field 'yuong'; did you mean 'young'?"),
+        (("materials", "sand", "density"), None, "materials.sand: the field 'density' is missing"),
+        (("pairs", 0, "friction"), -0.1, "pairs[0].friction: must be at least 0, got -0.1"),
+        (("pairs", 0, "restitution"), 0, "pairs[0].restitution: must be greater than 0"),
+        (("pairs", 1), {"between": ["sand", "ice"], "restitution": 1, "friction": 1}, "pairs: unknown material 'ice'"),
+        (("pairs",), [GOOD["pairs"][0]], "pairs: no entry for 'sand' and 'steel'"),
+        (("fills", 0, "radius"), -0.005, "fills[0].radius: must be greater than 0 [m]"),
+        (("fills", 0, "radius"), {"uniform": [0.2, 0.1]}, "fills[0].radius: radii must be positive and in order"),
+        (("fills", 0, "count"), 2.5, "fills[0].count: must be a whole number"),
+        (("fills", 0, "height"), 0.05, "fills[0]: give exactly one of 'count', 'height' and 'file'"),
+        (("fills", 0, "material"), "gravel", "unknown material 'gravel'"),
+        (("fills", 0, "region", "high"), [0.1, 0.1, -0.1], "fills[0].region: 'low'"),
+        (("boundaries", 0, "type"), "sphere", "boundaries[0].type: unknown 'sphere'; known are plane, box, cylinder"),
+        (("boundaries", 0, "normal"), [0, 0, 0], "boundaries[0].normal: must not be the zero vector"),
+        (("boundaries", 0, "normal"), [0, 0, float("nan")], "boundaries[0].normal[2]: must be finite"),
+        (("tools", "spade", "particle_radius"), 0, "tools.spade.particle_radius: must be greater than 0"),
+        (
+            ("tools", "spade", "pose"),
+            {"orientation": [0, 0, 0, 0]},
+            "tools.spade.pose.orientation: must not be the zero quaternion",
+        ),
+        (("tools", "spade", "trajectory"), [{"time": 1}, {"time": 1}], "tools.spade.trajectory[1].time: must be later"),
+        (("tools", "my spade"), GOOD["tools"]["spade"], "tools.my spade: a tool's name becomes part of its topics"),
+        (("contact",), {"normal": "hertzz"}, "contact.normal: unknown 'hertzz'; known are"),
+        (("solver",), {"time_step": -1}, "solver.time_step: must be greater than 0 [s]"),
+        (("solver",), {"precision": "half"}, "solver.precision: unknown 'half'"),
+        (("gravity",), [0, 0], "gravity: must be a list of 3 numbers"),
+        (("domain",), {"low": [0, 0, 0], "high": [0.05, 1, 1]}, "domain: must contain the region of fill"),
+        (("frame_rate",), 0, "frame_rate: must be greater than 0"),
+        (("fills",), [], "fills: at least one fill is needed"),
+    ],
+)
+def test_refusals_name_the_field_and_the_fix(path, value, named):
+    with pytest.raises(SceneError) as caught:
+        read_scene(changed(path, value), Path.cwd())
+    assert named in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        ("a: [1, 2", "is not valid YAML"),
+        ("- 1\n- 2", "must be a mapping"),
+        ("", "must be a mapping"),
+        ("\x00", "is not valid YAML"),
+    ],
+)
+def test_unreadable_files_are_refused_in_one_line(tmp_path, content, named):
+    path = tmp_path / "scene.yaml"
+    path.write_text(content)
+    with pytest.raises(SceneError) as caught:
+        load_scene(path)
+    assert named in str(caught.value)
+    assert "scene.yaml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_file_is_refused(tmp_path):
+    with pytest.raises(SceneError, match="No such file"):
+        load_scene(tmp_path / "nothing.yaml")
+    with pytest.raises(SceneError, match="the package's own scenes are"):
+        find_scene("nothing")
+
+
+def test_orientation_may_be_given_as_roll_pitch_yaw():
+    tool = GOOD["tools"]["spade"] | {"pose": {"rpy": [0.0, 0.0, np.pi / 2]}}
+    scene = read_scene(changed(("tools", "spade"), tool), Path.cwd())
+    assert scene.tool("spade").pose.orientation == pytest.approx((0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)))
+
+
+@pytest.mark.parametrize("path", sorted(config_folder().glob("*.yaml")), ids=lambda path: path.stem)
+def test_own_scenes_are_good(path):
+    assert load_scene(path).name == yaml.safe_load(path.read_text())["name"]

@@ -1,0 +1,133 @@
+"""Rules of the house that a machine can check."""
+
+import ast
+import dataclasses
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sand_sim import border
+from sand_sim.contact.normal import NORMAL_LAWS
+from sand_sim.contact.tangential import TANGENTIAL_LAWS
+from sand_sim.scene import types
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("sand_sim", "sampler", "msg_adapters")
+SOURCES = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+ROS = {
+    "rclpy",
+    "builtin_interfaces",
+    "diagnostic_msgs",
+    "geometry_msgs",
+    "rcl_interfaces",
+    "rosgraph_msgs",
+    "sensor_msgs",
+    "std_srvs",
+}
+# Who may import whom among the parts of sand_sim; a part may always import itself.
+BELOW = {
+    "contact": {"precision"},
+    "engine": {"contact", "precision", "grain_table"},
+    "scene": {"contact", "precision", "grain_table"},
+}
+
+
+def imports(path):
+    """Absolute names of all modules that a file imports."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+
+
+def test_lint():
+    done = subprocess.run([sys.executable, "-m", "ruff", "check", "."], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_format():
+    command = [sys.executable, "-m", "ruff", "format", "--check", "."]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_imports_point_one_way(path):
+    package, *_ = path.relative_to(ROOT).parts
+    names = {name.split(".")[0] for name in imports(path)}
+    if package == "sampler":
+        assert not names & (ROS | {"sand_sim", "msg_adapters"})
+    elif package == "msg_adapters":
+        assert {name for name in imports(path) if name.startswith("sand_sim")} <= {"sand_sim.border"}
+        assert "sampler" not in names
+    elif "node" not in path.parts:
+        assert not names & (ROS | {"msg_adapters"}), "only sand_sim.node knows ROS"
+    if package == "sand_sim":
+        part = path.relative_to(ROOT / "sand_sim").parts[0]
+        used = {name.split(".")[1] for name in imports(path) if name.startswith("sand_sim.")}
+        if part in BELOW:
+            assert used <= BELOW[part] | {part}
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_kernel_constants_are_exact(path):
+    """Warp rounds ``real(0.1)`` to single precision even where real is double; such constants must be quotients."""
+    for literal in re.findall(r"\breal\(([^()]*)\)", path.read_text()):
+        if re.fullmatch(r"-?[0-9.]+(e-?[0-9]+)?", literal):
+            value = float(literal)
+            assert (value == float(f"{value:.7g}") and (value * 2**20).is_integer()) or literal in ALLOWED, literal
+        assert not re.fullmatch(r"[0-9.]+ / [0-9.]+", literal), f"real({literal}) is rounded; write real(a) / real(b)"
+
+
+ALLOWED = {"1.05"}  # growth of cells, not physics
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_are_small(path):
+    assert len(path.read_text().splitlines()) <= 330
+
+
+def fields_without_unit(module):
+    """Float and vector fields of a module's dataclasses whose line or docstring entry shows no [unit]."""
+    source = Path(module.__file__).read_text().splitlines()
+    for kind in vars(module).values():
+        if not (isinstance(kind, type) and dataclasses.is_dataclass(kind) and kind.__module__ == module.__name__):
+            continue
+        for field in dataclasses.fields(kind):
+            if not re.search(r"\bfloat\b|Vector|ndarray", str(field.type)):
+                continue
+            lines = [line for line in source if re.match(rf"\s+{field.name}: ", line)]
+            entries = [
+                line for line in (kind.__doc__ or "").splitlines() if re.match(rf"\s+(\w+, )*{field.name}(, \w+)*: ", line)
+            ]
+            if not any(
+                "[" in line.split(":", 1)[1].replace("tuple[", "") or "orientation" in line for line in [*lines, *entries]
+            ):
+                yield f"{kind.__name__}.{field.name}"
+
+
+@pytest.mark.parametrize("module", [types, border], ids=lambda module: module.__name__)
+def test_physical_fields_have_units(module):
+    without = set(fields_without_unit(module))
+    assert without <= {
+        "SizeDistribution.weights",
+        "GrainCloud.identity",
+        "Pose.position",  # its units are in the docstring's first line
+        "Pose.orientation",
+    }
+
+
+@pytest.mark.parametrize(("slot", "name"), [("normal", n) for n in NORMAL_LAWS] + [("tangential", n) for n in TANGENTIAL_LAWS])
+def test_laws_have_source_and_test(slot, name):
+    laws = NORMAL_LAWS if slot == "normal" else TANGENTIAL_LAWS
+    text = laws[name].build.__doc__
+    if name != "none":
+        assert "Source: " in text
+        assert "``F" in text
+    tests = "".join(path.read_text() for path in (ROOT / "test").rglob("test_*.py"))
+    default = {"normal": types.Contact().normal, "tangential": types.Contact().tangential}[slot]
+    assert name == default or f'"{slot}": "{name}"' in tests
