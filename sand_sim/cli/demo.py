@@ -22,11 +22,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--view", action="store_true", help="open the Rerun viewer")
 
 
-def execute(options: argparse.Namespace) -> int:
+def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb."""
     path = find_scene(options.scene)
     scene = load_scene(path)
-    interruption = Interruption()
     parameters = {
         "scene": str(path),
         "pacing": "lockstep",

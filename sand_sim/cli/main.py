@@ -3,10 +3,7 @@
 import argparse
 import sys
 
-from sand_sim.cli import demo, play, run
-from sand_sim.scene.types import SceneError
-
-_VERBS = (run, demo, play)
+from sand_sim.interruption import InterruptedByUserError, Interruption
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -15,9 +12,13 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         Exit code: 0 done, 1 refused with one line that says why, 130 interrupted.
     """
+    interruption = Interruption()  # before the long imports
+    from sand_sim.cli import demo, play, run
+    from sand_sim.scene.types import SceneError
+
     parser = argparse.ArgumentParser(prog="sand_sim", description=__doc__.split(": ", 1)[1])
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
-    for verb in _VERBS:
+    for verb in (run, demo, play):
         name = verb.__name__.rsplit(".", 1)[-1]
         first = verb.__doc__.split("\n", 1)[0]
         one = verbs.add_parser(name, help=first, description=first)
@@ -25,11 +26,12 @@ def main(arguments: list[str] | None = None) -> int:
         one.set_defaults(execute=verb.execute)
     options = parser.parse_args(arguments)
     try:
-        return options.execute(options)
+        interruption.check()
+        return options.execute(options, interruption)
     except SceneError as error:
         print(f"sand_sim: {error}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
+    except InterruptedByUserError:
         return 130
 
 

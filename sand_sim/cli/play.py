@@ -3,6 +3,7 @@
 import argparse
 
 from sand_sim.config_folder import find_scene
+from sand_sim.interruption import Interruption
 from sand_sim.scene.reading import load_scene
 from sand_sim.scene.types import SceneError
 
@@ -13,11 +14,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--node", default="sand_sim", help="name of the node")
 
 
-def execute(options: argparse.Namespace) -> int:
+def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb."""
     scene = load_scene(find_scene(options.scene))
     try:
         from sand_sim.node.player import play
     except ModuleNotFoundError as error:
         raise SceneError(f"'play' needs ROS 2, and {error.name} cannot be imported; try 'run', which does not") from None
-    return play(scene, options.node)
+    return play(scene, options.node, interruption)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from sand_sim.cli.console import Console
 from sand_sim.config_folder import find_scene
-from sand_sim.interruption import InterruptedByUserError, Interruption
+from sand_sim.interruption import Interruption
 from sand_sim.playing import commands_at, frame_times
 from sand_sim.report import progress_line, summary_text
 from sand_sim.scene.reading import load_scene
@@ -24,9 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--particles", action="store_true", help="draw the particles of tools in Rerun")
 
 
-def execute(options: argparse.Namespace) -> int:
+def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb."""
-    interruption, console = Interruption(), Console()
+    console = Console()
     scene = load_scene(find_scene(options.scene))
     if options.threads:
         scene = replace(scene, solver=replace(scene.solver, threads=options.threads))
@@ -35,10 +35,7 @@ def execute(options: argparse.Namespace) -> int:
         interruption.check()
         console.stage(stage, share)
 
-    try:
-        world = World(scene, progress)
-    except InterruptedByUserError:
-        return 130
+    world = World(scene, progress)
     recorder = Recorder(world, options.out / f"{scene.name}.rrd", options.out, options.view, options.particles)
     recorder.write(world.observe())
     if world.assembly.time_step.warning:

@@ -2,14 +2,7 @@
 
 import sys
 
-import rclpy
-from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.signals import SignalHandlerOptions
-
 from sand_sim.interruption import InterruptedByUserError, Interruption
-from sand_sim.node.node import SandSimNode
-from sand_sim.scene.types import SceneError
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -18,23 +11,30 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         Exit code: 0, or 1 if the node could not start.
     """
-    interruption = Interruption()
+    interruption = Interruption()  # before the long imports
+    import rclpy
+    from rclpy.exceptions import ParameterException
+    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.signals import SignalHandlerOptions
+
+    from sand_sim.node.node import SandSimNode
+    from sand_sim.scene.types import SceneError
+
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     node = None
     try:
+        interruption.check()
         node = SandSimNode(progress=interruption.check)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         while not (interruption.asked or node.done):
             executor.spin_once(timeout_sec=0.1)
         return 0
-    except InterruptedByUserError:
+    except (InterruptedByUserError, ExternalShutdownException):
         return 0
     except (SceneError, ValueError, ParameterException) as error:
         print(f"sand_sim: {error}", file=sys.stderr)
         return 1
-    except ExternalShutdownException:
-        return 0
     finally:
         if node is not None:
             node.close()

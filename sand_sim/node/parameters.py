@@ -19,6 +19,7 @@ class Declaration:
         description: shown by ``ros2 param describe``.
         low, high: inclusive range of a number.
         choices: allowed texts.
+        changeable: while the node runs.
     """
 
     name: str
@@ -27,6 +28,7 @@ class Declaration:
     low: float | None = None
     high: float | None = None
     choices: tuple[str, ...] = ()
+    changeable: bool = False
 
 
 DECLARATIONS = (
@@ -34,8 +36,8 @@ DECLARATIONS = (
     Declaration("pacing", "realtime", "How simulated time advances: realtime, fast or lockstep.", choices=PACINGS),
     Declaration("real_time_factor", 1.0, "Simulated over wall seconds in realtime pacing [1].", 0.001, 1000.0),
     Declaration("frame_id", "world", "Name of the world frame in all messages."),
-    Declaration("points_rate", 25.0, "Point clouds per simulated second [1/s]; 0 for none.", 0.0, 1000.0),
-    Declaration("points_decimation", 1, "Publish the grains whose id is a multiple of this [1].", 1, 1_000_000),
+    Declaration("points_rate", 25.0, "Point clouds per simulated second [1/s]; 0 for none.", 0.0, 1000.0, changeable=True),
+    Declaration("points_decimation", 1, "Publish the grains whose id is a multiple of this [1].", 1, 1_000_000, changeable=True),
     Declaration("paused", False, "Start held; go on with the pause service."),
     Declaration("duration", 0.0, "End after this simulated time [s]; 0 for never.", 0.0, 1.0e9),
     Declaration("recording", "", "Rerun recording to write (.rrd); empty for none."),
@@ -47,9 +49,9 @@ DECLARATIONS = (
 
 
 def declare_parameters(node: Node) -> None:
-    """Declare all parameters, read-only while running."""
+    """Declare all parameters."""
     for declaration in DECLARATIONS:
-        descriptor = ParameterDescriptor(description=declaration.description, read_only=True)
+        descriptor = ParameterDescriptor(description=declaration.description, read_only=not declaration.changeable)
         if declaration.choices:
             descriptor.additional_constraints = f"One of {', '.join(declaration.choices)}."
         if isinstance(declaration.default, float):

@@ -16,17 +16,17 @@ _AHEAD = 0.2  # [s] of simulated time by which poses are sent before they are du
 _FRAME_ID = "world"
 
 
-def play(scene: Scene, target: str) -> int:
+def play(scene: Scene, target: str, interruption: Interruption) -> int:
     """Send all poses of a scene's trajectories, stamped with simulated time.
 
     Args:
         scene: with trajectories.
         target: name of the node, which is waited for.
+        interruption: the user's wish to stop.
 
     Returns:
         Exit code: 0 when all has been played or the node has gone, 130 when interrupted.
     """
-    interruption = Interruption()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("sand_sim_player")
     try:

@@ -3,6 +3,8 @@
 from pathlib import Path
 
 import numpy as np
+import trimesh
+import yaml
 
 from sand_sim import World, read_scene
 
@@ -63,3 +65,43 @@ def record(world: World, steps: int, every: int = 1) -> dict[str, np.ndarray]:
         rows.append((world.time, grains.position, grains.velocity, grains.spin))
     names = ("time", "position", "velocity", "spin")
     return {name: np.array(column) for name, column in zip(names, zip(*rows, strict=True), strict=True)}
+
+
+def write_small_scene(folder: Path, **further) -> Path:
+    """A scene file with a few grains on a floor and a plate above them, quick to start and to run."""
+    mesh = trimesh.creation.box((0.06, 0.06, 0.004))
+    mesh.export(folder / "plate.stl")
+    lattice = np.stack(np.meshgrid(range(4), range(4), range(2), indexing="ij"), -1).reshape(-1, 3)
+    np.savez(folder / "bed.npz", position=0.0101 * lattice + [0.0, 0.0, 0.0049], radius=np.full(len(lattice), 0.005))
+    parsed = {
+        "name": "small",
+        "materials": {
+            "sand": {"density": 2600.0, "young": 1e7, "poisson": 0.25},
+            "steel": {"density": 7800.0, "young": 1e8, "poisson": 0.3},
+        },
+        "pairs": [
+            {"between": ["sand", "sand"], "restitution": 0.3, "friction": 0.5},
+            {"between": ["sand", "steel"], "restitution": 0.3, "friction": 0.3},
+        ],
+        "fills": [{"material": "sand", "file": "bed.npz"}],
+        "boundaries": [{"name": "floor", "type": "plane", "material": "steel", "point": [0, 0, 0], "normal": [0, 0, 1]}],
+        "domain": {"low": [-0.2, -0.2, -0.05], "high": [0.25, 0.25, 0.3]},
+        "tools": {
+            "plate": {
+                "mesh": "plate.stl",
+                "material": "steel",
+                "particle_radius": 0.003,
+                "max_speed": 1.0,
+                "trajectory": [
+                    {"time": 0.0, "position": [0.015, 0.015, 0.06]},
+                    {"time": 0.3, "position": [0.015, 0.015, 0.024], "phase": "press"},
+                    {"time": 0.4, "position": [0.02, 0.015, 0.05], "phase": "carry"},
+                ],
+            }
+        },
+        "duration": 0.4,
+        "frame_rate": 50,
+    }
+    path = folder / "small.yaml"
+    path.write_text(yaml.safe_dump(parsed | further))
+    return path

@@ -1,0 +1,89 @@
+"""The command line as users type it."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from scenes import write_small_scene
+
+PATIENCE = 120.0
+
+
+def sand_sim(folder, *words, **further):
+    command = [sys.executable, "-m", "sand_sim", *map(str, words)]
+    return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **further)
+
+
+def finish(process):
+    output, errors = process.communicate(timeout=PATIENCE)
+    return process.returncode, output, errors
+
+
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["demo", "--help"], ["play", "--help"]])
+def test_help(tmp_path, words):
+    code, output, _ = finish(sand_sim(tmp_path, *words))
+    assert code == 0
+    assert "usage: sand_sim" in output
+
+
+def test_run_writes_everything_and_sums_up(tmp_path):
+    scene = write_small_scene(tmp_path)
+    code, output, errors = finish(sand_sim(tmp_path, "run", scene, "--out", "results", "--threads", 2))
+    assert code == 0, errors
+    summary = json.loads((tmp_path / "results" / "small.json").read_text())
+    assert summary["grains"] == 32
+    assert summary["simulated_s"] == pytest.approx(0.4)
+    assert summary["tools"]["plate"]["peak_draft_N"] >= 0.0
+    assert {"carried_kg", "spilled_kg"} <= set(summary["tools"]["plate"])
+    assert summary["doubts"] == []
+    for kind in ("rrd", "npz", "png"):
+        assert (tmp_path / "results" / f"small.{kind}").stat().st_size > 1000
+    for word in ("real-time factor", "peak draft", "energy balance", "largest overlap / radius"):
+        assert word in output
+
+
+def test_refusals_are_one_line(tmp_path):
+    code, _, errors = finish(sand_sim(tmp_path, "run", "nothing"))
+    assert code == 1
+    assert errors.startswith("sand_sim: scene 'nothing': there is no such file")
+    assert len(errors.strip().splitlines()) == 1
+
+
+def test_ctrl_c_keeps_what_was_recorded(tmp_path):
+    process = sand_sim(tmp_path, "run", "dig", "--out", "results")
+    begin = time.monotonic()
+    while not (tmp_path / "results" / "dig.rrd").exists():
+        assert time.monotonic() - begin < PATIENCE
+        time.sleep(0.1)
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    code, output, errors = finish(process)
+    assert code == 130
+    assert "Traceback" not in errors
+    assert json.loads((tmp_path / "results" / "dig.json").read_text())["steps"] > 0
+    assert "written: results/dig.rrd" in output
+
+
+def test_demo_drives_the_node_through_ros(tmp_path):
+    pytest.importorskip("rclpy", reason="needs ROS 2")
+    scene = write_small_scene(tmp_path)
+    code, output, errors = finish(sand_sim(tmp_path, "demo", scene, "--out", "results"))
+    assert code == 0, errors
+    assert "written: results/small.rrd, results/small.png" in output
+    assert json.loads((tmp_path / "results" / "small.json").read_text())["simulated_s"] == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize("delay", [0.5, 4.0])
+def test_ctrl_c_ends_the_demo_and_its_processes(tmp_path, delay):
+    pytest.importorskip("rclpy", reason="needs ROS 2")
+    process = sand_sim(tmp_path, "demo", "dig", "--out", "results")
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    code, _, errors = finish(process)
+    assert code == 130, errors
+    assert "Traceback" not in errors
+    left = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True).stdout
+    assert str(tmp_path) not in left
