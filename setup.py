@@ -1,4 +1,4 @@
-"""Package set-up for colcon (ament_python) and for pip; everything is pinned, see constraints.txt for the rest."""
+"""Package set-up for colcon (ament_python) and for pip; constraints.txt pins what is left open here."""
 
 from glob import glob
 from pathlib import Path
@@ -7,6 +7,7 @@ from setuptools import find_packages, setup
 
 NAME = "sand_sim"
 SHARE = f"share/{NAME}"
+RERUN = "rerun-sdk==0.41.0"  # needs NumPy 2
 
 setup(
     name=NAME,
@@ -26,18 +27,13 @@ setup(
         (f"{SHARE}/launch", glob("launch/*.launch.py")),
     ],
     zip_safe=True,
-    install_requires=[
-        "setuptools",
-        "numpy==2.5.5",
-        "warp-lang==1.19.0",
-        "trimesh==5.2.0",
-        "pycollada==0.9.3",
-        "rerun-sdk==0.41.0",
-        "PyYAML==6.0.3",
-    ],
+    # The messages of an apt ROS are built for the system's NumPy 1.26, which must be allowed to stay.
+    install_requires=["setuptools", "numpy>=1.26", "warp-lang==1.19.0", "trimesh==5.2.0", "pycollada==0.9.3", "PyYAML>=6.0.1"],
     extras_require={
+        "recording": [RERUN],
         # Only for machines without an apt ROS, which these wheels would hide.
         "ros": [
+            RERUN,
             "ros-jazzy-rclpy==7.1.6",
             "ros-jazzy-common-interfaces==5.3.6",
             "ros-jazzy-rmw-fastrtps-cpp==8.4.3",

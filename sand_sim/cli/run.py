@@ -10,7 +10,7 @@ from sand_sim.interruption import Interruption
 from sand_sim.playing import commands_at, frame_times
 from sand_sim.report import progress_line, summary_text
 from sand_sim.scene.reading import load_scene
-from sand_sim.sinks.recorder import Recorder
+from sand_sim.sinks.recorder import Recorder, RecordingError
 from sand_sim.world import World
 
 
@@ -36,7 +36,13 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         console.stage(stage, share)
 
     world = World(scene, progress)
-    recorder = Recorder(world, options.out / f"{scene.name}.rrd", options.out, options.view, options.particles)
+    recording = options.out / f"{scene.name}.rrd"
+    try:
+        recorder = Recorder(world, recording, options.out, options.view, options.particles)
+    except RecordingError as error:
+        console.line(str(error), force=True)
+        console.end()
+        recorder, recording = Recorder(world, output=options.out), None
     recorder.write(world.observe())
     if world.assembly.time_step.warning:
         console.line(f"warning: {world.assembly.time_step.warning}", force=True)
@@ -51,5 +57,5 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     console.end()
     files = recorder.close()
     print(f"{scene.name}:\n{summary_text(recorder.log.summarise())}")
-    print("written: " + ", ".join(str(path) for path in [options.out / f"{scene.name}.rrd", *files]))
+    print("written: " + ", ".join(str(path) for path in [recording, *files] if path))
     return 130 if interruption.asked else 0

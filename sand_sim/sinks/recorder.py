@@ -3,9 +3,12 @@
 from pathlib import Path
 
 from sand_sim.border import Observation
-from sand_sim.sinks.rerun_sink import RerunSink
 from sand_sim.sinks.run_log import RunLog
 from sand_sim.world import World
+
+
+class RecordingError(ValueError):
+    """A recording that cannot be made."""
 
 
 class Recorder:
@@ -17,6 +20,9 @@ class Recorder:
         output: folder for ``NAME.json``, ``NAME.npz`` and, where matplotlib is installed, ``NAME.png``; None for none.
         view: open the Rerun viewer.
         particles: draw the particles of tools in Rerun.
+
+    Raises:
+        RecordingError: if a recording or the viewer is asked for and Rerun cannot be imported.
 
     Attributes:
         log: history of the run.
@@ -32,7 +38,9 @@ class Recorder:
     ):
         self.log = RunLog(world.scene)
         self._world, self._output = world, output
-        self._rerun = RerunSink(world, recording, view, particles) if recording or view else None
+        self._rerun = None
+        if recording or view:
+            self._rerun = _open_rerun(world, recording, view, particles)
 
     def write(self, observation: Observation) -> None:
         """Add one observation to all sinks; time zero begins a new history."""
@@ -62,3 +70,13 @@ class Recorder:
         except ModuleNotFoundError:
             pass  # matplotlib is an extra; the npz holds all that the figure shows
         return files
+
+
+def _open_rerun(world: World, recording: Path | None, view: bool, particles: bool):
+    try:
+        from sand_sim.sinks.rerun_sink import RerunSink
+    except ImportError as error:
+        raise RecordingError(
+            f"recording: Rerun cannot be imported ({error}); pip install 'sand_sim[recording]', or leave recording and view empty"
+        ) from None
+    return RerunSink(world, recording, view, particles)
