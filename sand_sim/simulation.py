@@ -33,6 +33,7 @@ class Simulation:
         real_time_factor: simulated over wall seconds in ``realtime``.
         on_frame: called in the stepping thread with each observation.
         on_fault: called in the stepping thread with the error that ended it.
+        on_reject: called with the error for each rejected command.
 
     Attributes:
         rejected: number of rejected commands by reason.
@@ -47,12 +48,13 @@ class Simulation:
         real_time_factor: float = 1.0,
         on_frame: Callable[[Observation], None] = lambda observation: None,
         on_fault: Callable[[Exception], None] = lambda error: None,
+        on_reject: Callable[[CommandError], None] = lambda error: None,
     ):
         self.world, self.pacing, self.real_time_factor = world, pacing, real_time_factor
         self.rejected: Counter[str] = Counter()
         self.limited = 0
         self.last_rejection = ""
-        self._on_frame, self._on_fault = on_frame, on_fault
+        self._on_frame, self._on_fault, self._on_reject = on_frame, on_fault, on_reject
         self._wake = threading.Condition()
         self._inbox: deque[ToolPose] = deque()
         self._requests: deque[tuple[str, Future]] = deque()
@@ -97,6 +99,7 @@ class Simulation:
         """Count a command that was refused before it could be submitted."""
         self.rejected[error.reason] += 1
         self.last_rejection = str(error)
+        self._on_reject(error)
 
     def pause(self, paused: bool) -> None:
         """Hold or go on."""

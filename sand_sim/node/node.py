@@ -66,7 +66,12 @@ class SandSimNode(Node):
         self._last: Observation | None = None
         self._fault: Exception | None = None
         self.simulation = Simulation(
-            world, settings["pacing"], settings["real_time_factor"], on_frame=self._publish, on_fault=self._fail
+            world,
+            settings["pacing"],
+            settings["real_time_factor"],
+            on_frame=self._publish,
+            on_fault=self._fail,
+            on_reject=lambda error: self.get_logger().warning(f"rejected: {error}", throttle_duration_sec=1.0),
         )
         self._advertise()
         if world.assembly.time_step.warning:

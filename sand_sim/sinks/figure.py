@@ -36,9 +36,11 @@ def draw_run(log: RunLog, tools: list[ToolModel], path: Path) -> None:
     axes = np.atleast_1d(right.subplots(len(views), 1))
     for axis, (_, observation) in zip(axes, views, strict=True):
         _draw_view(axis, observation, tools)
-    widest = [f(limits) for f, limits in zip((min, max), zip(*(axis.get_xlim() for axis in axes), strict=True), strict=True)]
+    limits = np.array([[axis.get_xlim(), axis.get_ylim()] for axis in axes])
+    low, high = limits[..., 0].min(axis=0), limits[..., 1].max(axis=0)
     for axis, (name, observation) in zip(axes, views, strict=True):
-        axis.set_xlim(widest)
+        axis.set_xlim(low[0], high[0])
+        axis.set_ylim(low[1], high[1])
         axis.set_title(f"{name}, t = {observation.time:.2f} s", fontsize=9, loc="left")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=130)

@@ -1,6 +1,6 @@
 """Recordings for Rerun: grains, tools, wrenches and health on simulated time."""
 
-import subprocess
+import contextlib
 import sys
 from pathlib import Path
 
@@ -10,11 +10,12 @@ import rerun.blueprint as rrb
 
 from sand_sim.border import Observation
 from sand_sim.sinks.colours import colour_by_speed
+from sand_sim.sinks.viewer import open_viewer
 from sand_sim.world import World
 
 _TIMELINE = "sim_time"
-_VIEWER_PORT = 9876
 _AXES = "xyz"
+_LONGEST_FLUSH = 20.0  # [s]
 
 
 class RerunSink:
@@ -35,10 +36,11 @@ class RerunSink:
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
             sinks.append(rr.FileSink(str(path)))
-        if view:
-            # The viewer's own spawn helper listens on all interfaces; this one on this machine only.
-            subprocess.Popen([sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", str(_VIEWER_PORT)])
-            sinks.append(rr.GrpcSink(f"rerun+http://127.0.0.1:{_VIEWER_PORT}/proxy"))
+        viewer = open_viewer() if view else None
+        if viewer:
+            sinks.append(rr.GrpcSink(viewer))
+        elif view:
+            print("sand_sim: the Rerun viewer could not be opened; going on without it", file=sys.stderr)
         self._recording.set_sinks(*sinks, default_blueprint=_blueprint(world))
         self._draw_still(world, particles)
 
@@ -74,8 +76,9 @@ class RerunSink:
             recording.log(f"health/{name}", rr.Scalars(value))
 
     def close(self) -> None:
-        """Write out what is pending."""
-        self._recording.flush()
+        """Write out what is pending, as far as a viewer that may be gone allows."""
+        with contextlib.suppress(RuntimeError):
+            self._recording.flush(timeout_sec=_LONGEST_FLUSH)
         self._recording.disconnect()
 
     def _draw_still(self, world: World, particles: bool) -> None:

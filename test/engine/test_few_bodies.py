@@ -138,6 +138,30 @@ def test_floor_carries_the_weight(make_world):
     assert observation.health.retired == 0
 
 
+def test_swings_in_a_cylinder(make_world):
+    """A frictionless sphere in a lying cylinder is a pendulum of length R - r; its small swings take 2 pi sqrt((R - r)/g)."""
+    radius, pipe = 0.005, 0.05
+    swing = (pipe - radius) * np.sin(0.1)
+    world = make_world(
+        [[0.0, swing, pipe - (pipe - radius) * np.cos(0.1)]],
+        radius,
+        material=SAND,
+        restitution=1.0,
+        friction=0.0,
+        gravity=[0.0, 0.0, -9.81],
+        boundaries=[{"type": "cylinder", "material": "wall", "point": [0.0, 0.0, pipe], "axis": [2.0, 0.0, 0.0], "radius": pipe}],
+        domain={"low": [-0.1] * 3, "high": [0.1] * 3},
+        precision="single",
+    )
+    every = 50
+    history = record(world, round(1.0 / world.time_step / every), every)
+    y, time = history["position"][:, 0, 1], history["time"]
+    crossings = time[1:][(y[:-1] < 0.0) & (y[1:] >= 0.0)]
+    period = 2.0 * np.pi * np.sqrt((pipe - radius) / 9.81) * (1.0 + 0.1**2 / 16.0)
+    assert np.diff(crossings).mean() == pytest.approx(period, rel=5e-3)
+    assert y.max() == pytest.approx(swing, rel=1e-2)
+
+
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_same_bits_on_any_number_of_threads(make_world, threads):
     """Grains, contact lists and sums are the same to the bit, also when searches come in between."""
