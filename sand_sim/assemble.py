@@ -8,10 +8,6 @@ import trimesh
 
 from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_body
 from sand_sim import rotation
-from sand_sim.contact.contact import contact_types
-from sand_sim.contact.damping import damping_ratio
-from sand_sim.contact.normal import NORMAL_LAWS
-from sand_sim.contact.response import ContactModel
 from sand_sim.engine.arrays import DemArrays, Setting
 from sand_sim.engine.device import open_device
 from sand_sim.engine.explicit_dem import ExplicitDem
@@ -22,7 +18,8 @@ from sand_sim.engine.tool_body import ToolBody
 from sand_sim.grain_table import GrainTable
 from sand_sim.precision import PRECISIONS, Precision
 from sand_sim.scene.filling import fill_grains
-from sand_sim.scene.time_step import TimeStep, choose_time_step, effective_shear, effective_young, fastest_speed
+from sand_sim.scene.pairing import pair_numbers
+from sand_sim.scene.time_step import TimeStep, choose_time_step, fastest_speed
 from sand_sim.scene.types import Scene, SceneError, Tool
 from sand_sim.scene.walls import Wall, walls_of
 
@@ -105,14 +102,15 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     precision = PRECISIONS[scene.solver.precision]
     lattice = _lattice(scene, table, walls, tools, precision)
     recipe = Recipe(
-        contact=ContactModel(scene.contact.normal, scene.contact.tangential),
+        contact=scene.contact,
         precision=precision,
+        integrator=scene.solver.integrator,
         materials=len({fill.material for fill in scene.fills}) > 1,
     )
     skin = scene.solver.skin or _SKIN * float(table.radius.mean())
     arrays = DemArrays(
         recipe,
-        Setting(np.asarray(scene.gravity), time_step.value, skin),
+        Setting(np.asarray(scene.gravity), time_step.value, skin, _reach(scene, table, order)),
         lattice,
         table,
         [_surface(wall, order, lattice) for wall in walls],
@@ -192,22 +190,27 @@ def _surface(wall: Wall, order: list[str], lattice: Lattice):
 
 def _pair_table(scene: Scene, order: list[str], precision: Precision) -> list[list]:
     """One ``MaterialPair`` per pair of materials; pairs that never meet stay empty."""
-    named = {m.name: m for m in scene.materials}
-    given = {frozenset(rule.between): rule for rule in scene.pairs}
-    exponent = NORMAL_LAWS[scene.contact.normal].exponent
+    struct = scene.contact.types(precision).pair
     table = []
     for a in order:
         row = []
         for b in order:
-            pair = contact_types(precision).pair()
-            rule = given.get(frozenset((a, b)))
-            if rule:
-                pair.young = effective_young(named[a], named[b])
-                pair.shear = effective_shear(named[a], named[b])
-                pair.friction = rule.friction
-                twice = 2.0 * damping_ratio(rule.restitution, exponent)
-                pair.normal_damping = twice * np.sqrt(2.0 * pair.young)
-                pair.shear_damping = twice * np.sqrt(8.0 * pair.shear)
+            pair, numbers = struct(), pair_numbers(scene, a, b)
+            if numbers:
+                for law in scene.contact.laws.values():
+                    for name, value in law.prepare(numbers).items():
+                        setattr(pair, name, value)
             row.append(pair)
         table.append(row)
     return table
+
+
+def _reach(scene: Scene, table: GrainTable, order: list[str]) -> float:
+    """Widest gap across which any contact of the scene acts [m]."""
+    law = scene.contact.law("cohesion")
+    if scene.contact.cohesion == "none":
+        return 0.0
+    pairs = [numbers for a in order for b in order if (numbers := pair_numbers(scene, a, b))]
+    sizes = {float(radius) for radius in (table.radius.min(), table.radius.max())}
+    # The effective radius of two grains lies between half the smaller and, at a wall, the larger one's radius.
+    return max(law.reach(pair, least, share * least) for pair in pairs for least in sizes for share in (0.5, 1.0))

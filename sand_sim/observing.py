@@ -5,20 +5,22 @@ import numpy as np
 from sand_sim import rotation
 from sand_sim.assemble import Assembly, ToolModel
 from sand_sim.border import GrainCloud, Health, ToolReport, WallReport
+from sand_sim.engine.explicit_dem import Sums
 from sand_sim.track import Track
 from sand_sim.trust import find_doubts
 
 
 def observe_grains(assembly: Assembly) -> GrainCloud:
-    """All grains in the domain, in the order of their identities."""
-    grains, lattice = assembly.solver.arrays.grains, assembly.lattice
+    """All grains in the domain, in the order of their identities, as the solver has last measured them."""
+    arrays, lattice = assembly.solver.arrays, assembly.lattice
+    grains = arrays.grains
     active = grains.active.get()
     place = grains.place.numpy()[:active]
     here = np.flatnonzero(place[:, 3] > 0)
     identity = grains.identity.numpy()[here]
     order = here[np.argsort(identity)]
-    place, motion = place[order], grains.motion.numpy()[order]
-    spin = grains.spin.numpy()[order, :3] if grains.spin is not None else np.zeros_like(motion[:, :3])
+    place, motion = place[order], arrays.seen_motion.numpy()[order]
+    spin = arrays.seen_spin.numpy()[order, :3] if grains.spin is not None else np.zeros_like(motion[:, :3])
     return GrainCloud(
         identity=np.sort(identity),
         position=lattice.to_world(place[:, :3]),
@@ -30,7 +32,7 @@ def observe_grains(assembly: Assembly) -> GrainCloud:
 
 
 def observe_tools(
-    assembly: Assembly, tracks: list[Track], cloud: GrainCloud, time: float, passed: float
+    assembly: Assembly, tracks: list[Track], cloud: GrainCloud, time: float, means: np.ndarray
 ) -> tuple[ToolReport, ...]:
     """Reports of all tools.
 
@@ -39,12 +41,11 @@ def observe_tools(
         tracks: where the tools are going.
         cloud: the grains now.
         time: now [s].
-        passed: time over which impulses have been summed [s]; at zero the wrench of the last step is given.
+        means: force and torque on each tool since the last observation, world frame, shape (tools, 2, 3) [N], [N m].
     """
     tools = assembly.solver.arrays.tools
     if tools is None:
         return ()
-    means = tools.impulse.numpy() / passed if passed > 0.0 else tools.wrench.numpy()
     work = tools.work.numpy()
     reports = []
     for index, (model, track) in enumerate(zip(assembly.tools, tracks, strict=True)):
@@ -80,15 +81,16 @@ def observe_walls(assembly: Assembly) -> tuple[WallReport, ...]:
     return tuple(WallReport(one.name, -total) for one, total in zip(assembly.walls, totals, strict=True))
 
 
-def observe_health(assembly: Assembly, start_energy: float, start_height: float) -> Health:
+def observe_health(assembly: Assembly, sums: Sums, start_energy: float, start_height: float) -> Health:
     """Error indicators now.
 
     Args:
         assembly: the world's.
+        sums: of now.
         start_energy: kinetic, potential and elastic energy at time zero [J].
         start_height: potential energy at time zero [J].
     """
-    arrays, chosen, sums = assembly.solver.arrays, assembly.time_step, assembly.solver.measure()
+    arrays, chosen = assembly.solver.arrays, assembly.time_step
     work = float(arrays.tools.work.numpy().sum()) if arrays.tools else 0.0
     kinetic = sums.translation + sums.rotation
     health = Health(

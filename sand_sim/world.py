@@ -6,6 +6,7 @@ from sand_sim import rotation
 from sand_sim.assemble import Assembly, Progress, ToolModel, assemble
 from sand_sim.border import CommandError, Observation, ToolPose
 from sand_sim.engine.tools import ToolTrack
+from sand_sim.integrator import VERLET
 from sand_sim.observing import observe_grains, observe_health, observe_tools, observe_walls
 from sand_sim.scene.types import Scene
 from sand_sim.track import Track
@@ -37,7 +38,8 @@ class World:
         sums = self._solver.measure()
         self._start_height = sums.height
         self._start_energy = sums.translation + sums.rotation + sums.height + sums.elastic
-        self._observed_steps = 0
+        tools = self._solver.arrays.tools
+        self._observed_steps, self._observed_wrench = 0, tools.wrench.numpy().copy() if tools else None
         self._initial = self.save()
 
     @property
@@ -127,15 +129,28 @@ class World:
 
     def observe(self) -> Observation:
         """What the world shows now; forces on tools are means since the last observation."""
-        steps = self._solver.steps_done
+        steps, sums = self._solver.steps_done, self._solver.measure()
         cloud = observe_grains(self.assembly)
-        passed = (steps - self._observed_steps) * self.time_step
-        reports = observe_tools(self.assembly, self._tracks, cloud, self.time, passed)
-        self._observed_steps = steps
-        if reports:
-            self._solver.arrays.tools.impulse.zero_()
-        health = observe_health(self.assembly, self._start_energy, self._start_height)
+        reports = observe_tools(self.assembly, self._tracks, cloud, self.time, self._mean_wrenches(steps))
+        health = observe_health(self.assembly, sums, self._start_energy, self._start_height)
         return Observation(self.time, steps, cloud, reports, observe_walls(self.assembly), health)
+
+    def _mean_wrenches(self, steps: int) -> np.ndarray | None:
+        """Mean wrenches on the tools since the last observation, those of now if no time has passed."""
+        tools = self._solver.arrays.tools
+        if tools is None:
+            return None
+        now, passed = tools.wrench.numpy().copy(), (steps - self._observed_steps) * self.time_step
+        means = now
+        if passed > 0.0:
+            impulse = tools.impulse.numpy().copy()
+            if self.scene.solver.integrator == VERLET:
+                # The half steps at both ends, so that means times time are exactly the momentum that the grains show.
+                impulse += 0.5 * self.time_step * (now - self._observed_wrench)
+            means = impulse / passed
+            tools.impulse.zero_()
+        self._observed_steps, self._observed_wrench = steps, now
+        return means
 
     def reset(self) -> None:
         """Go back to time zero."""
@@ -148,6 +163,8 @@ class World:
             state[f"track.{name}"] = np.array([getattr(track, name) for track in self._tracks])
         state["start"] = np.array([self._start_energy, self._start_height])
         state["observed_steps"] = np.array(self._observed_steps)
+        if self._observed_wrench is not None:
+            state["observed_wrench"] = self._observed_wrench
         return state
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
@@ -156,7 +173,7 @@ class World:
         columns = [state[f"track.{name}"] for name in Track.__dataclass_fields__]
         self._tracks = [Track(*values) for values in zip(*columns, strict=True)]
         self._start_energy, self._start_height = (float(value) for value in state["start"])
-        self._observed_steps = int(state["observed_steps"])
+        self._observed_steps, self._observed_wrench = int(state["observed_steps"]), state.get("observed_wrench")
 
     def _set_tracks(self, tracks: list[Track]) -> None:
         self._tracks = tracks
@@ -177,6 +194,7 @@ class World:
         chunk = max(1, round(settle.time / _SETTLE_CHUNKS / self.time_step))
         for done in range(_SETTLE_CHUNKS):
             self._solver.run(chunk)
+            self._solver.measure()
             cloud = observe_grains(self.assembly)
             speed = np.sqrt(np.sum(cloud.mass * cloud.speed**2) / np.sum(cloud.mass))
             progress("settling", (done + 1) / _SETTLE_CHUNKS)

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from sand_sim import border
-from sand_sim.contact.normal import NORMAL_LAWS
-from sand_sim.contact.tangential import TANGENTIAL_LAWS
+from sand_sim.contact.model import SLOTS, ContactModel
 from sand_sim.scene import types
 
 ROOT = Path(__file__).parents[1]
@@ -30,8 +29,8 @@ ROS = {
 # Who may import whom among the parts of sand_sim; a part may always import itself.
 BELOW = {
     "contact": {"precision"},
-    "engine": {"contact", "precision", "grain_table"},
-    "scene": {"contact", "precision", "grain_table"},
+    "engine": {"contact", "precision", "integrator", "grain_table"},
+    "scene": {"contact", "precision", "integrator", "grain_table"},
 }
 
 
@@ -121,13 +120,10 @@ def test_physical_fields_have_units(module):
     }
 
 
-@pytest.mark.parametrize(("slot", "name"), [("normal", n) for n in NORMAL_LAWS] + [("tangential", n) for n in TANGENTIAL_LAWS])
+@pytest.mark.parametrize(("slot", "name"), [(slot, name) for slot, laws in SLOTS.items() for name in laws if name != "none"])
 def test_laws_have_source_and_test(slot, name):
-    laws = NORMAL_LAWS if slot == "normal" else TANGENTIAL_LAWS
-    text = laws[name].build.__doc__
-    if name != "none":
-        assert "Source: " in text
-        assert "``F" in text
+    text = SLOTS[slot][name].build.__doc__
+    assert "Source: " in text
+    assert "``F" in text or "``M" in text
     tests = "".join(path.read_text() for path in (ROOT / "test").rglob("test_*.py"))
-    default = {"normal": types.Contact().normal, "tangential": types.Contact().tangential}[slot]
-    assert name == default or f'"{slot}": "{name}"' in tests
+    assert name == getattr(ContactModel(), slot) or f'"{slot}": "{name}"' in tests

@@ -1,28 +1,15 @@
-"""Normal contact laws.
+"""Normal contact laws: ``(contact, pair) -> force [N] >= 0`` along ``contact.normal``; the energy beside it is ``-> [J]``."""
 
-Each is one Warp function ``(contact, pair) -> force [N] >= 0`` along ``contact.normal``. Beside it stands ``(contact, pair) ->
-energy [J]`` stored in the elastic part.
-"""
-
-from collections.abc import Callable
-from dataclasses import dataclass
-
+import numpy as np
 import warp as wp
 
-from sand_sim.contact.contact import contact_types
+from sand_sim.contact.contact import ContactTypes
+from sand_sim.contact.damping import damping_ratio
+from sand_sim.contact.law import Law, PairNumbers
 from sand_sim.precision import Precision
 
 
-@dataclass(frozen=True)
-class NormalLaw:
-    """A choice for the normal slot: its builders and the power of the overlap in its elastic force."""
-
-    build: Callable[[Precision], wp.Function]
-    build_energy: Callable[[Precision], wp.Function]
-    exponent: float
-
-
-def build_hertz(precision: Precision) -> wp.Function:
+def build_hertz(precision: Precision, types: ContactTypes) -> wp.Function:
     """Hertz contact with damping that never pulls.
 
     ``F = max(0, 4/3 E* a xi - 2 z sqrt(S m*) v_n)`` with the patch radius ``a = sqrt(R* xi)``, the tangent stiffness
@@ -31,21 +18,20 @@ def build_hertz(precision: Precision) -> wp.Function:
 
     Source: Hertz 1882; damping of Tsuji et al. 1992, https://doi.org/10.1016/0032-5910(92)88030-L.
     """
-    real, types = precision.real, contact_types(precision)
+    real = precision.real
 
     @wp.func
     def hertz(contact: types.contact, pair: types.pair) -> real:
-        tangent = real(2.0) * pair.young * contact.patch
-        elastic = real(2.0) / real(3.0) * tangent * contact.overlap
+        elastic = real(4.0) / real(3.0) * pair.young * contact.patch * contact.overlap
         viscous = pair.normal_damping * contact.inertia * contact.normal_speed
         return wp.max(elastic - viscous, real(0.0))
 
     return hertz
 
 
-def build_hertz_energy(precision: Precision) -> wp.Function:
-    """Energy of the elastic Hertz force, ``8/15 E* sqrt(R*) xi^2.5``."""
-    real, types = precision.real, contact_types(precision)
+def build_hertz_energy(precision: Precision, types: ContactTypes) -> wp.Function:
+    """Energy of the elastic Hertz force, ``8/15 E* a xi^2``."""
+    real = precision.real
 
     @wp.func
     def hertz_energy(contact: types.contact, pair: types.pair) -> real:
@@ -54,4 +40,95 @@ def build_hertz_energy(precision: Precision) -> wp.Function:
     return hertz_energy
 
 
-NORMAL_LAWS = {"hertz": NormalLaw(build_hertz, build_hertz_energy, exponent=1.5)}
+def prepare_hertz(pair: PairNumbers) -> dict[str, float]:
+    """Fields of the Hertz law."""
+    ratio = damping_ratio(pair.given["restitution"], exponent=1.5)
+    return {"young": pair.young, "normal_damping": 2.0 * ratio * np.sqrt(2.0 * pair.young)}
+
+
+def build_linear(precision: Precision, types: ContactTypes) -> wp.Function:
+    """Linear spring-dashpot that never pulls.
+
+    ``F = max(0, k xi - 2 z sqrt(k m*) v_n)`` with a stiffness that belongs to the pair, whatever the radii. Contact time and
+    restitution do not depend on speed. It is no elastic solid: stiffness does not grow with load.
+
+    Source: Cundall & Strack 1979, https://doi.org/10.1680/geot.1979.29.1.47; clipping as Schwager & Poeschel 2007,
+    https://doi.org/10.1007/s10035-007-0065-z.
+    """
+    real = precision.real
+
+    @wp.func
+    def linear(contact: types.contact, pair: types.pair) -> real:
+        viscous = pair.linear_damping * wp.sqrt(contact.mass) * contact.normal_speed
+        return wp.where(contact.overlap > real(0.0), wp.max(pair.stiffness * contact.overlap - viscous, real(0.0)), real(0.0))
+
+    return linear
+
+
+def build_linear_energy(precision: Precision, types: ContactTypes) -> wp.Function:
+    """Energy of the linear spring, ``k xi^2 / 2``."""
+    real = precision.real
+
+    @wp.func
+    def linear_energy(contact: types.contact, pair: types.pair) -> real:
+        return real(0.5) * pair.stiffness * contact.overlap * contact.overlap
+
+    return linear_energy
+
+
+def prepare_linear(pair: PairNumbers) -> dict[str, float]:
+    """Fields of the linear law."""
+    stiffness = pair.given["stiffness"]
+    ratio = damping_ratio(pair.given["restitution"], exponent=1.0)
+    return {"stiffness": stiffness, "linear_damping": 2.0 * ratio * np.sqrt(stiffness)}
+
+
+def build_viscoelastic(precision: Precision, types: ContactTypes) -> wp.Function:
+    """Hertz contact of viscoelastic spheres, never pulling; faster impacts lose a larger share.
+
+    ``F = max(0, 4/3 E* a (xi - 3/2 A v_n))`` with the viscous time A of the pair of materials. Valid while the impact is slow
+    against the speed of sound and A short against the contact. Restitution tends to one at low speed.
+
+    Source: Kuwabara & Kono 1987, https://doi.org/10.1143/JJAP.26.1230; Brilliantov et al. 1996,
+    https://doi.org/10.1103/PhysRevE.53.5382.
+    """
+    real = precision.real
+
+    @wp.func
+    def viscoelastic(contact: types.contact, pair: types.pair) -> real:
+        strain = contact.overlap - real(1.5) * pair.viscous_time * contact.normal_speed
+        return real(4.0) / real(3.0) * pair.young * contact.patch * wp.max(strain, real(0.0))
+
+    return viscoelastic
+
+
+def prepare_viscoelastic(pair: PairNumbers) -> dict[str, float]:
+    """Fields of the viscoelastic law."""
+    return {"young": pair.young, "viscous_time": pair.given["viscous_time"]}
+
+
+_YOUNG = {"young": "[Pa] E*: 1/E* = (1 - nu_a^2)/E_a + (1 - nu_b^2)/E_b"}
+
+NORMAL_LAWS = {
+    "hertz": Law(
+        build_hertz,
+        build_hertz_energy,
+        fields=_YOUNG | {"normal_damping": "[sqrt(Pa)] 2 z sqrt(2 E*), z the damping ratio"},
+        prepare=prepare_hertz,
+        asks=("restitution",),
+    ),
+    "linear": Law(
+        build_linear,
+        build_linear_energy,
+        fields={"stiffness": "[N/m] k", "linear_damping": "[sqrt(N/m)] 2 z sqrt(k), z the damping ratio"},
+        prepare=prepare_linear,
+        asks=("restitution", "stiffness"),
+    ),
+    "viscoelastic": Law(
+        build_viscoelastic,
+        build_hertz_energy,
+        fields=_YOUNG | {"viscous_time": "[s] A"},
+        prepare=prepare_viscoelastic,
+        asks=("viscous_time",),
+    ),
+}

@@ -1,65 +1,40 @@
-"""From the kinematics of a contact to the force: the one line in which every kind of contact ends."""
+"""From the kinematics of a contact to forces and moments: the one line in which every kind of contact ends."""
 
-from dataclasses import dataclass
 from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.contact import contact_types
-from sand_sim.contact.normal import NORMAL_LAWS
-from sand_sim.contact.tangential import TANGENTIAL_LAWS
+from sand_sim.contact.contact import contact_type
+from sand_sim.contact.model import ContactModel
 from sand_sim.precision import Precision
 
 
-@dataclass(frozen=True)
-class ContactModel:
-    """One choice per slot of the contact law; static, so another choice is another kernel."""
-
-    normal: str = "hertz"
-    tangential: str = "mindlin"
-
-    @property
-    def history(self) -> bool:
-        """Whether contacts remember their slip."""
-        return TANGENTIAL_LAWS[self.tangential].history
-
-    @property
-    def rotation(self) -> bool:
-        """Whether contacts can turn a sphere."""
-        return TANGENTIAL_LAWS[self.tangential].rotation
-
-
-@cache
-def build_response(model: ContactModel, precision: Precision) -> wp.Function:
-    """Warp function ``(contact, pair, spring, dt) -> (normal_force [N], tangential force [N], spring [m])`` on body a."""
-    vec3, real, types = precision.vec3, precision.real, contact_types(precision)
-    normal = NORMAL_LAWS[model.normal].build(precision)
-    tangential = TANGENTIAL_LAWS[model.tangential].build(precision)
-
-    @wp.func
-    def response(contact: types.contact, pair: types.pair, spring: vec3, dt: real):
-        normal_force = normal(contact, pair)
-        tangential_force, stretched = tangential(contact, pair, normal_force, spring, dt)
-        return normal_force, tangential_force, stretched
-
-    return response
+def memory_type(model: ContactModel, precision: Precision) -> type:
+    """Warp vector with all that a contact remembers."""
+    return {3: precision.vec3, 4: precision.vec4}.get(len(model.memory)) or wp.types.vector(
+        max(len(model.memory), 1), precision.real
+    )
 
 
 @cache
 def build_meeting(precision: Precision) -> wp.Function:
-    """Warp function that fills a ``Contact`` from normal, overlap and the relative velocity at the contact point [m/s]."""
-    real, vec3, types = precision.real, precision.vec3, contact_types(precision)
+    """Warp function that fills a ``Contact`` from normal, overlap, relative velocity at the contact point and relative spin."""
+    real, vec3, contact_struct = precision.real, precision.vec3, contact_type(precision)
 
     @wp.func
-    def meeting(normal: vec3, overlap: real, velocity: vec3, radius: real, mass: real) -> types.contact:
-        contact = types.contact()
+    def meeting(
+        normal: vec3, overlap: real, velocity: vec3, turning: vec3, radius: real, least: real, mass: real
+    ) -> contact_struct:
+        contact = contact_struct()
         contact.normal = normal
         contact.overlap = overlap
         contact.normal_speed = wp.dot(velocity, normal)
         contact.slip = velocity - normal * contact.normal_speed
+        contact.turning = turning
         contact.radius = radius
+        contact.least = least
         contact.mass = mass
-        contact.patch = wp.sqrt(radius * overlap)
+        contact.patch = wp.sqrt(radius * wp.max(overlap, real(0.0)))
         contact.inertia = wp.sqrt(contact.patch * mass)
         return contact
 
@@ -67,14 +42,136 @@ def build_meeting(precision: Precision) -> wp.Function:
 
 
 @cache
-def build_stored_energy(model: ContactModel, precision: Precision) -> wp.Function:
-    """Warp function ``(contact, pair, spring) -> energy [J]`` stored in both springs of a contact."""
-    real, vec3, types = precision.real, precision.vec3, contact_types(precision)
-    normal_energy = NORMAL_LAWS[model.normal].build_energy(precision)
-    stiffness = TANGENTIAL_LAWS[model.tangential].build_stiffness(precision)
+def build_memory_slot(model: ContactModel, precision: Precision, slot: str) -> tuple[wp.Function, wp.Function]:
+    """Warp functions that take the memory of one slot out of a contact's memory, and put it back."""
+    real, vec3, vec4 = precision.real, precision.vec3, precision.vec4
+    memory, first, length = memory_type(model, precision), model.offset(slot), len(model.laws[slot].memory)
+
+    if length in (3, 4) and length == len(model.memory):
+
+        @wp.func
+        def take(whole: memory):
+            return whole
+
+        @wp.func
+        def put(whole: memory, part: memory):
+            return part
+
+    elif length == 4:
+
+        @wp.func
+        def take(whole: memory):
+            return vec4(
+                whole[wp.static(first)], whole[wp.static(first + 1)], whole[wp.static(first + 2)], whole[wp.static(first + 3)]
+            )
+
+        @wp.func
+        def put(whole: memory, part: vec4):
+            for k in range(4):
+                whole[wp.static(first) + k] = part[k]
+            return whole
+
+    elif length == 1:
+
+        @wp.func
+        def take(whole: memory):
+            return whole[wp.static(first)]
+
+        @wp.func
+        def put(whole: memory, part: real):
+            whole[wp.static(first)] = part
+            return whole
+
+    else:
+
+        @wp.func
+        def take(whole: memory):
+            part = vec3(real(0.0))
+            if wp.static(length == 3):
+                part = vec3(whole[wp.static(first)], whole[wp.static(first + 1)], whole[wp.static(first + 2)])
+            return part
+
+        @wp.func
+        def put(whole: memory, part: vec3):
+            if wp.static(length == 3):
+                for k in range(3):
+                    whole[wp.static(first) + k] = part[k]
+            return whole
+
+    return take, put
+
+
+@cache
+def build_response(model: ContactModel, precision: Precision) -> wp.Function:
+    """Warp function ``(contact, pair, memory, dt) -> (push, drag, moment, memory)`` on body a.
+
+    ``push`` [N] acts along the normal and may pull, ``drag`` [N] in the tangent plane at the contact point, ``moment`` [N m] is
+    that of rolling and twisting resistance.
+    """
+    vec3, real, types = precision.vec3, precision.real, model.types(precision)
+    built = {slot: law.build(precision, types) for slot, law in model.laws.items()}
+    normal, tangential, rolling, twisting, cohesion = built.values()
+    has_tangential, has_rolling, has_twisting = (law is not None for law in (tangential, rolling, twisting))
+    cohesive, memory_vector = model.cohesive, memory_type(model, precision)
+    take_slip, put_slip = build_memory_slot(model, precision, "tangential")
+    take_roll, put_roll = build_memory_slot(model, precision, "rolling")
+    take_twist, put_twist = build_memory_slot(model, precision, "twisting")
+    take_bond, put_bond = build_memory_slot(model, precision, "cohesion")
 
     @wp.func
-    def stored_energy(contact: types.contact, pair: types.pair, spring: vec3) -> real:
-        return normal_energy(contact, pair) + real(0.5) * stiffness(contact, pair) * wp.dot(spring, spring)
+    def response(contact: types.contact, pair: types.pair, memory: memory_vector, dt: real):
+        push = real(0.0)
+        drag = vec3(real(0.0))
+        moment = vec3(real(0.0))
+        after = memory_vector()
+        # Where nothing acts across a gap only touching contacts come here.
+        if not wp.static(cohesive) or contact.overlap > real(0.0):
+            push = normal(contact, pair)
+            if wp.static(has_tangential):
+                drag, slipped = tangential(contact, pair, push, take_slip(memory), dt)
+                after = put_slip(after, slipped)
+            if wp.static(has_rolling):
+                turn, rolled = rolling(contact, pair, push, take_roll(memory), dt)
+                moment += turn
+                after = put_roll(after, rolled)
+            if wp.static(has_twisting):
+                twist, twisted = twisting(contact, pair, push, take_twist(memory), dt)
+                moment += twist
+                after = put_twist(after, twisted)
+        if wp.static(cohesive):
+            attraction, bond = cohesion(contact, pair, take_bond(memory))
+            push -= attraction
+            after = put_bond(after, bond)
+        return push, drag, moment, after
+
+    return response
+
+
+@cache
+def build_stored_energy(model: ContactModel, precision: Precision) -> wp.Function:
+    """Warp function ``(contact, pair, memory) -> energy [J]`` stored in all springs of a contact."""
+    real, types = precision.real, model.types(precision)
+    built = {slot: law.build_energy and law.build_energy(precision, types) for slot, law in model.laws.items()}
+    normal, tangential, rolling, twisting, cohesion = built.values()
+    has = {slot: energy is not None for slot, energy in built.items()}
+    take_slip, _ = build_memory_slot(model, precision, "tangential")
+    take_roll, _ = build_memory_slot(model, precision, "rolling")
+    take_twist, _ = build_memory_slot(model, precision, "twisting")
+    take_bond, _ = build_memory_slot(model, precision, "cohesion")
+
+    @wp.func
+    def stored_energy(contact: types.contact, pair: types.pair, memory: memory_type(model, precision)) -> real:
+        energy = real(0.0)
+        if contact.overlap > real(0.0):
+            energy += normal(contact, pair)
+            if wp.static(has["tangential"]):
+                energy += tangential(contact, pair, take_slip(memory))
+            if wp.static(has["rolling"]):
+                energy += rolling(contact, pair, take_roll(memory))
+            if wp.static(has["twisting"]):
+                energy += twisting(contact, pair, take_twist(memory))
+        if wp.static(has["cohesion"]):
+            energy += cohesion(contact, pair, take_bond(memory))
+        return energy
 
     return stored_energy

@@ -1,25 +1,41 @@
-"""The one line in which every contact ends: apply the law and store what it gives, or let the contact go."""
+"""The one line in which every contact ends: apply the laws and store what they give, or let the contact go."""
 
 from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.contact import contact_types
-from sand_sim.contact.response import build_response, build_stored_energy
+from sand_sim.contact.response import build_response, build_stored_energy, memory_type
 from sand_sim.engine.recipe import Recipe
 
 
 @cache
+def build_acts(recipe: Recipe) -> wp.Function:
+    """Warp function ``(contact, touching, memory) -> bool``: whether a contact exerts forces; with cohesion also across a gap."""
+    model = recipe.contact
+    cohesive, bond, memory = model.cohesive, model.offset("cohesion"), memory_type(model, recipe.precision)
+    real = recipe.precision.real
+
+    @wp.func
+    def acts(contact: int, touching: bool, memory: wp.array(dtype=memory)) -> bool:
+        result = touching
+        if wp.static(cohesive):
+            result = touching or memory[contact][wp.static(bond)] > real(0.0)
+        return result
+
+    return acts
+
+
+@cache
 def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function]:
-    """Warp functions ``act`` for a touching and ``release`` for a parted contact.
+    """Warp functions ``act`` for a contact that exerts forces and ``release`` for one that does not.
 
     Args:
         recipe: static choices.
-        measuring: write the energy stored in the contact and change nothing else.
+        measuring: write the energy stored in the contact too, and let nothing else outlast this call.
     """
-    precision, rotation, history = recipe.precision, recipe.rotation, recipe.history
+    precision, rotation, history, couples = recipe.precision, recipe.rotation, recipe.history, recipe.contact.couples
     real, vec3, vec4 = precision.real, precision.vec3, precision.vec4
-    types = contact_types(precision)
+    types, memory_vector = recipe.contact.types(precision), memory_type(recipe.contact, precision)
     response, stored_energy = build_response(recipe.contact, precision), build_stored_energy(recipe.contact, precision)
 
     @wp.func
@@ -31,43 +47,61 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
         arm_loss: real,
         lane: int,
         depth: real,
-        spring: wp.array(dtype=vec3),
+        memory: wp.array(dtype=memory_vector),
         force: wp.array(dtype=vec3),
         couple: wp.array(dtype=vec4),
+        moment: wp.array(dtype=vec3),
         deepest: wp.array(dtype=real),
         energy: wp.array(dtype=real),
     ):
-        before = vec3(real(0.0))
+        before = memory_vector()
         if wp.static(history):
-            before = spring[contact]
+            before = memory[contact]
+        push, drag, resistance, after = response(met, pair, before, dt)
+        force[contact] = met.normal * push + drag
+        if wp.static(rotation):
+            turn = wp.cross(drag, met.normal)
+            couple[contact] = vec4(turn[0], turn[1], turn[2], arm_loss)
+        if wp.static(couples):
+            moment[contact] = resistance
         if wp.static(measuring):
             energy[contact] = stored_energy(met, pair, before)
         else:
-            push, drag, after = response(met, pair, before, dt)
-            force[contact] = met.normal * push + drag
-            if wp.static(rotation):
-                turn = wp.cross(drag, met.normal)
-                couple[contact] = vec4(turn[0], turn[1], turn[2], arm_loss)
             if wp.static(history):
-                spring[contact] = after
+                memory[contact] = after
             if depth > deepest[lane]:
                 wp.atomic_max(deepest, lane, depth)
 
     @wp.func
     def release(
         contact: int,
-        spring: wp.array(dtype=vec3),
+        memory: wp.array(dtype=memory_vector),
         force: wp.array(dtype=vec3),
         couple: wp.array(dtype=vec4),
+        moment: wp.array(dtype=vec3),
         energy: wp.array(dtype=real),
     ):
+        force[contact] = vec3(real(0.0))
+        if wp.static(rotation):
+            couple[contact] = vec4(real(0.0))
+        if wp.static(couples):
+            moment[contact] = vec3(real(0.0))
         if wp.static(measuring):
             energy[contact] = real(0.0)
-        else:
-            force[contact] = vec3(real(0.0))
-            if wp.static(rotation):
-                couple[contact] = vec4(real(0.0))
-            if wp.static(history):
-                spring[contact] = vec3(real(0.0))
+        elif wp.static(history):
+            memory[contact] = memory_vector()
 
     return act, release
+
+
+@cache
+def build_swapped(recipe: Recipe) -> wp.Function:
+    """Warp function that gives what a contact remembers once its bodies have swapped roles."""
+    memory = memory_type(recipe.contact, recipe.precision)
+    signs = memory(*recipe.contact.memory)
+
+    @wp.func
+    def swapped(kept: memory) -> memory:
+        return wp.cw_mul(kept, wp.static(signs))
+
+    return swapped

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from sand_sim.contact.contact import contact_types
 from sand_sim.engine import energy, tool_contacts
 from sand_sim.engine.cells import prepare_cells
 from sand_sim.engine.contact_list import ContactList
@@ -18,6 +17,7 @@ from sand_sim.engine.sorting import SortedItems
 from sand_sim.engine.surfaces import surface_type
 from sand_sim.engine.tool_body import ToolBody, Tools
 from sand_sim.grain_table import GrainTable
+from sand_sim.integrator import VERLET
 
 _ROOM_TO_SPARE = 1.25
 _FIRST_PAIRS = 5  # room for contacts per grain to begin with
@@ -30,12 +30,19 @@ class Setting:
     Attributes:
         gravity: shape (3,) [m/s^2].
         dt: time step [s].
-        skin: distance beyond touch at which contacts are listed [m].
+        skin: how far grains may move, together, before the lists are made anew [m].
+        reach: widest gap across which a contact acts, zero without cohesion [m].
     """
 
     gravity: np.ndarray
     dt: float
     skin: float
+    reach: float = 0.0
+
+    @property
+    def listing_gap(self) -> float:
+        """Widest gap across which a contact is listed [m]."""
+        return self.skin + self.reach
 
 
 class DemArrays:
@@ -71,14 +78,19 @@ class DemArrays:
         self.grains = Grains(table, lattice, recipe, lanes, device)
         self.kinds = len(pairs)
         rows = [pair for row in pairs for pair in row]
-        self.pairs = wp.array(rows, dtype=contact_types(precision).pair, device=device)
+        self.pairs = wp.array(rows, dtype=recipe.contact.types(precision).pair, device=device)
         self.deepest = wp.zeros(lanes, dtype=precision.real, device=device)
         self.fastest = wp.zeros(lanes, dtype=precision.real, device=device)
 
-        self.cells = prepare_cells(table.radius, setting.skin, lattice, lanes, device)
+        self.cells = prepare_cells(table.radius, setting.listing_gap, lattice, lanes, device)
         self.in_cells = SortedItems.allocate(self.cells.room, number, lanes, device)
         self.keys = wp.zeros(number, dtype=int, device=device)
         self.spare = {array.dtype: wp.zeros_like(array) for array in self.grains.sorted_arrays}
+        # What an observer sees lies in scratch that is idle between neighbour searches.
+        self.seen_motion, self.seen_spin = self.grains.motion, self.grains.spin
+        if recipe.integrator == VERLET:
+            self.seen_motion = self.spare[precision.vec4]
+            self.seen_spin = self.spare[precision.vec3] if recipe.rotation else None
         self.every_start = Count(number + 1, lanes, device)
         self.every_start.set(number + 1)
         self.met = SortedItems.allocate(number, 0, lanes, device)
@@ -86,7 +98,7 @@ class DemArrays:
         self.pair_list = self._contact_list(_FIRST_PAIRS * number)
         self.walls = wp.array(walls, dtype=surface_type(precision), device=device) if walls else None
         self.wall_list = self._contact_list(number) if walls else None
-        farthest = float(table.radius.max()) + setting.skin
+        farthest = float(table.radius.max()) + setting.listing_gap
         self.tools = Tools(bodies, farthest, precision, device) if bodies else None
         self.tool_list = self._contact_list(max(number // 4, 64)) if bodies else None
         self.grain_blocks = wp.zeros(energy.blocks_for(number), dtype=wp.vec3d, device=device)
@@ -120,5 +132,4 @@ class DemArrays:
             self.wrench_blocks = wp.zeros((blocks * self.tools.number, 2), dtype=wp.vec3d, device=self.device)
 
     def _contact_list(self, room: int) -> ContactList:
-        recipe = self.recipe
-        return ContactList(room, self.grains.capacity, recipe.precision, recipe.history, recipe.rotation, self.lanes, self.device)
+        return ContactList(room, self.grains.capacity, self.recipe, self.lanes, self.device)

@@ -8,11 +8,12 @@ from functools import cache
 
 import warp as wp
 
+from sand_sim.contact.response import memory_type
 from sand_sim.engine.count import Count, share_out
 from sand_sim.engine.flags import FAULT_ROOM, Flags
 from sand_sim.engine.kernel import kernel
+from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.sorting import record_running_totals
-from sand_sim.precision import Precision
 
 
 class ContactList:
@@ -25,29 +26,37 @@ class ContactList:
         partner: the other grain, the wall or the tool particle, int, shape (room,).
         force: on the owner, vec3, shape (room,) [N].
         couple: tangential torque per lever arm (vec3 [N]) and half the overlap [m], vec4, shape (room,); None without rotation.
-        spring: tangential history, vec3, shape (room,) [m]; None without history.
+        moment: rolling and twisting resistance on the owner, vec3, shape (room,) [N m]; None without.
+        memory: what the contact laws remember, shape (room,); None without history.
+        drawer: memory of the last list while a new one is made; None without history.
         wanted: contacts found by the last search, int, shape (1,).
     """
 
-    def __init__(self, room: int, grains: int, precision: Precision, history: bool, rotation: bool, lanes: int, device: str):
-        self.precision, self.history, self.rotation, self.device = precision, history, rotation, device
+    def __init__(self, room: int, grains: int, recipe: Recipe, lanes: int, device: str):
+        self.recipe, self.device = recipe, device
         self.pairs = Count(0, lanes, device)
         self.counts, self.totals = wp.zeros(grains, dtype=int, device=device), wp.zeros(lanes, dtype=int, device=device)
         self.starts, self.new_starts, self.old_starts = (wp.zeros(grains + 1, dtype=int, device=device) for _ in range(3))
         self.wanted = wp.zeros(1, dtype=int, device=device)
-        self.partner = self.spring = None
+        self.partner = self.memory = None
         self.make_room(room)
 
     def make_room(self, room: int) -> None:
         """Enlarge the list; its contents stay."""
-        vec3, vec4 = self.precision.vec3, self.precision.vec4
-        self.pairs.capacity = room
+        recipe = self.recipe
+        vec3, vec4, memory = recipe.precision.vec3, recipe.precision.vec4, memory_type(recipe.contact, recipe.precision)
+        self.pairs.capacity, kept = room, self.memory
         self.owner = wp.zeros(room, dtype=int, device=self.device)
         self.partner = self._enlarged(self.partner, int)
         self.old_partner = wp.zeros(room, dtype=int, device=self.device)
         self.force = wp.zeros(room, dtype=vec3, device=self.device)
-        self.couple = wp.zeros(room, dtype=vec4, device=self.device) if self.rotation else None
-        self.spring = self._enlarged(self.spring, vec3) if self.history else None
+        self.couple = wp.zeros(room, dtype=vec4, device=self.device) if recipe.rotation else None
+        self.moment = wp.zeros(room, dtype=vec3, device=self.device) if recipe.contact.couples else None
+        self.memory = self.drawer = None
+        if recipe.history:
+            self.memory = self._enlarged(kept, memory)
+            # The force array is idle while lists are made.
+            self.drawer = self.force if memory is vec3 else wp.zeros(room, dtype=memory, device=self.device)
 
     def _enlarged(self, old: wp.array | None, dtype: type) -> wp.array:
         new = wp.zeros(self.pairs.capacity, dtype=dtype, device=self.device)
@@ -107,9 +116,8 @@ def keep_starts(
 
 
 @cache
-def build_keep_contacts(precision: Precision, history: bool) -> wp.Kernel:
-    """Kernel that puts partners and springs of the last list aside; the force array, idle now, serves as the drawer."""
-    vec3 = precision.vec3
+def build_keep_contacts(memory: type) -> wp.Kernel:
+    """Kernel that puts partners and memories of the last list aside."""
 
     @kernel
     def keep_contacts(
@@ -117,14 +125,13 @@ def build_keep_contacts(precision: Precision, history: bool) -> wp.Kernel:
         spans: wp.array(dtype=int),
         stride: int,
         partner: wp.array(dtype=int),
-        spring: wp.array(dtype=vec3),
+        kept: wp.array(dtype=memory),
         old_partner: wp.array(dtype=int),
-        drawer: wp.array(dtype=vec3),
+        drawer: wp.array(dtype=memory),
     ):
         for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
             old_partner[i] = partner[i]
-            if wp.static(history):
-                drawer[i] = spring[i]
+            drawer[i] = kept[i]
 
     return keep_contacts
 
@@ -140,20 +147,20 @@ def record_count(recorder, contacts: ContactList, grains: Count, counting, flags
 
 
 def record_fill(recorder, contacts: ContactList, grain_starts: Count, filling) -> None:
-    """Write the contacts counted before with ``filling()``, which finds the last list in ``old_*`` and ``force``.
+    """Write the contacts counted before with ``filling()``, which finds the last list in ``old_*`` and ``drawer``.
 
     Args:
         recorder: where the launches go.
         contacts: the list.
         grain_starts: as many items as the list has starts, retired grains of the last list included.
-        filling: launch that writes owner, partner and spring.
+        filling: launch that writes owner, partner and memory.
     """
     recorder.each(keep_starts, grain_starts, [contacts.new_starts, contacts.starts, contacts.old_starts], wait=False)
-    if contacts.history:
+    if contacts.memory is not None:
         recorder.each(
-            build_keep_contacts(contacts.precision, contacts.history),
+            build_keep_contacts(contacts.memory.dtype),
             contacts.pairs,
-            [contacts.partner, contacts.spring, contacts.old_partner, contacts.force],
+            [contacts.partner, contacts.memory, contacts.old_partner, contacts.drawer],
         )
     else:
         recorder.wait()

@@ -6,6 +6,7 @@ import warp as wp
 
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.recipe import Recipe
+from sand_sim.integrator import VERLET
 from sand_sim.precision import Precision
 
 BLOCK = 256  # items per partial sum
@@ -20,6 +21,7 @@ def blocks_for(items: int) -> int:
 def build_grain_energy(recipe: Recipe) -> wp.Kernel:
     """Kernel for energies of grains: ``blocks`` holds translation, rotation and height [J], ``fastest`` the top speed [m/s]."""
     precision, rotation = recipe.precision, recipe.rotation
+    spin_type = precision.vec3 if recipe.integrator == VERLET else precision.vec4
     real, whole, vec3, vec4, whole4 = precision.real, precision.whole, precision.vec3, precision.vec4, precision.whole4
 
     @kernel
@@ -29,6 +31,7 @@ def build_grain_energy(recipe: Recipe) -> wp.Kernel:
         spans: wp.array(dtype=int),
         place: wp.array(dtype=whole4),
         motion: wp.array(dtype=vec4),
+        turning_now: wp.array(dtype=spin_type),
         spin: wp.array(dtype=vec4),
         gravity: vec3,
         quantum: real,
@@ -51,9 +54,8 @@ def build_grain_energy(recipe: Recipe) -> wp.Kernel:
                     height = -wp.dot(gravity, vec3(real(here[0]), real(here[1]), real(here[2])) * quantum)
                     turning = real(0.0)
                     if wp.static(rotation):
-                        spinning = spin[i]
-                        omega = vec3(spinning[0], spinning[1], spinning[2])
-                        turning = spinning[3] * wp.dot(omega, omega)
+                        omega = vec3(turning_now[i][0], turning_now[i][1], turning_now[i][2])
+                        turning = spin[i][3] * wp.dot(omega, omega)
                     total += wp.vec3d(
                         wp.float64(real(0.5) * of_i[3] * square),
                         wp.float64(real(0.5) * turning),
@@ -67,7 +69,7 @@ def build_grain_energy(recipe: Recipe) -> wp.Kernel:
 
 @cache
 def build_contact_energy(precision: Precision) -> wp.Kernel:
-    """Kernel that sums the energies stored in contacts [J] and counts those that touch."""
+    """Kernel that sums the energies stored in contacts [J] and counts those that act."""
     real = precision.real
 
     @kernel
@@ -81,7 +83,7 @@ def build_contact_energy(precision: Precision) -> wp.Kernel:
             first = block * wp.static(BLOCK)
             for contact in range(first, wp.min(first + wp.static(BLOCK), contacts)):
                 stored = wp.float64(energy[contact])
-                if stored > wp.float64(0.0):
+                if stored != wp.float64(0.0):
                     total += wp.vec2d(stored, wp.float64(1.0))
             blocks[block] = total
 

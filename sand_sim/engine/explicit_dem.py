@@ -49,6 +49,7 @@ class ExplicitDem:
         self.arrays, self.device = arrays, device
         self.stages = choose_stages(arrays)
         self._programs = {}
+        arrays.flags.starting.fill_(1)
         self.expect_moves()
 
     @property
@@ -59,7 +60,7 @@ class ExplicitDem:
     def expect_moves(self) -> None:
         """Renew all contact lists before the next step: something has been moved from outside."""
         self.arrays.flags.grains_moved.fill_(1)
-        self.arrays.flags.tools_moved.fill_(1)
+        self.arrays.flags.tools_moved.fill_(1 if self.arrays.tools else 0)
 
     def run(self, steps: int) -> None:
         """Advance by a number of steps.
@@ -75,15 +76,19 @@ class ExplicitDem:
     def begin(self) -> None:
         """Make this moment time zero: renew the lists and forget what has been counted and summed up."""
         arrays = self.arrays
-        self._play(record_renewal)
-        while int(arrays.flags.grains_moved.numpy()[0]):
-            self._play(record_renewal)
+        self.renew_lists()
         arrays.flags.steps_done.zero_()
         arrays.deepest.zero_()
         arrays.grains.retired.zero_()
         if arrays.tools:
             for sum_so_far in (arrays.tools.wrench, arrays.tools.impulse, arrays.tools.work):
                 sum_so_far.zero_()
+
+    def renew_lists(self) -> None:
+        """Make the contact lists anew where they are no longer valid, as the next step would."""
+        flags = self.arrays.flags
+        while int(flags.grains_moved.numpy()[0]) or int(flags.tools_moved.numpy()[0]):
+            self._play(record_renewal)
 
     def remove(self, identities: np.ndarray) -> None:
         """Retire grains by their identities, shape (n,)."""
@@ -96,8 +101,9 @@ class ExplicitDem:
         self.expect_moves()
 
     def measure(self) -> Sums:
-        """Sum energies and contacts over all lists as they stand."""
+        """Bring forces, wrenches and the velocities ``seen_*`` up to now, and sum energies and contacts."""
         arrays = self.arrays
+        self.renew_lists()
         self._program(record_measurement)()
         grains = arrays.grain_blocks.numpy()[: blocks_for(arrays.grains.active.get())]
         translation, rotation, height = grains.sum(axis=0)

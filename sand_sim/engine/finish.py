@@ -47,24 +47,11 @@ def build_place_tools(precision: Precision) -> wp.Kernel:
 
 
 @kernel
-def sum_wrenches(
-    pair_spans: wp.array(dtype=int),
-    blocks: wp.array2d(dtype=wp.vec3d),
-    dt: wp.float64,
-    tracks: wp.array(dtype=ToolTrack),
-    steps_done: wp.array(dtype=wp.int64),
-    wrench: wp.array2d(dtype=wp.vec3d),
-    impulse: wp.array2d(dtype=wp.vec3d),
-    work: wp.array(dtype=wp.float64),
-):
-    """Wrench of the sand on each tool now, its impulse over the frame, and the work of the tool on the sand since the start.
-
-    ``wrench`` and ``impulse`` have shape (tools, 2): force and torque about the tool frame's origin, world frame.
-    """
+def sum_wrenches(pair_spans: wp.array(dtype=int), blocks: wp.array2d(dtype=wp.vec3d), wrench: wp.array2d(dtype=wp.vec3d)):
+    """Wrench of the sand on each tool now, shape (tools, 2): force and torque about the tool frame's origin, world frame."""
     tools = wrench.shape[0]
     pairs = pair_spans[pair_spans.shape[0] - 1]
     number = (pairs + wp.static(SUM_BLOCK) - 1) // wp.static(SUM_BLOCK)
-    time = wp.float64(steps_done[0]) * dt
     for tool in range(tools):
         force = wp.vec3d(wp.float64(0.0))
         torque = wp.vec3d(wp.float64(0.0))
@@ -73,6 +60,22 @@ def sum_wrenches(
             torque += blocks[block * tools + tool, 1]
         wrench[tool, 0] = force
         wrench[tool, 1] = torque
+
+
+@kernel
+def sum_impulses(
+    dt: wp.float64,
+    tracks: wp.array(dtype=ToolTrack),
+    steps_done: wp.array(dtype=wp.int64),
+    wrench: wp.array2d(dtype=wp.vec3d),
+    impulse: wp.array2d(dtype=wp.vec3d),
+    work: wp.array(dtype=wp.float64),
+):
+    """Impulse of the wrenches over the frame, shape (tools, 2), and work of the tools on the sand since the start."""
+    time = wp.float64(steps_done[0]) * dt
+    for tool in range(wrench.shape[0]):
+        force = wrench[tool, 0]
+        torque = wrench[tool, 1]
         impulse[tool, 0] = impulse[tool, 0] + force * dt
         impulse[tool, 1] = impulse[tool, 1] + torque * dt
         track = tracks[tool]
@@ -84,12 +87,14 @@ def sum_wrenches(
 def finish_step(
     steps_done: wp.array(dtype=wp.int64),
     steps_left: wp.array(dtype=int),
+    starting: wp.array(dtype=int),
     fault: wp.array(dtype=int),
     running: wp.array(dtype=int),
 ):
     """Count the step and decide whether the frame's loop goes on."""
     steps_done[0] = steps_done[0] + wp.int64(1)
     steps_left[0] = steps_left[0] - 1
+    starting[0] = 0
     if steps_left[0] <= 0 or fault[0] != 0:
         running[0] = 0
 

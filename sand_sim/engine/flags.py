@@ -16,11 +16,12 @@ class Flags:
         grains_moved: some grain may have met a neighbour that is not on its list.
         tools_moved: the same for tools.
         fault: bits FAULT_*.
+        starting: no step has been done since velocities were set.
         steps_left: steps still to do in this frame.
         steps_done: steps since the world began (int64).
     """
 
     def __init__(self, device: str):
-        for name in ("running", "proceed", "grains_moved", "tools_moved", "fault", "steps_left"):
+        for name in ("running", "proceed", "grains_moved", "tools_moved", "fault", "starting", "steps_left"):
             setattr(self, name, wp.zeros(1, dtype=int, device=device))
         self.steps_done = wp.zeros(1, dtype=wp.int64, device=device)

@@ -7,6 +7,7 @@ from sand_sim.engine.count import Count
 from sand_sim.engine.lattice import Lattice
 from sand_sim.engine.recipe import Recipe
 from sand_sim.grain_table import GrainTable
+from sand_sim.integrator import VERLET
 
 
 class Grains:
@@ -18,6 +19,7 @@ class Grains:
         remainder: what the position is beyond whole quanta, vec3, shape (n,) [quantum].
         motion: velocity [m/s] and, last, mass [kg], vec4, shape (n,).
         spin: angular velocity [rad/s] and, last, moment of inertia [kg m^2], vec4, shape (n,); None without rotation.
+        half_motion, half_spin: velocities half a step ago, vec3, shape (n,) [m/s], [rad/s]; None unless the integrator asks.
         material: shape (n,), int; None if all grains are of one material.
         identity: number of the grain in the scene's table, shape (n,), int.
         came_from: its number when the contact lists were made, shape (n,), int.
@@ -33,6 +35,9 @@ class Grains:
         self.remainder = wp.zeros(number, dtype=precision.vec3, device=device)
         self.motion = wp.zeros(number, dtype=precision.vec4, device=device)
         self.spin = wp.zeros(number, dtype=precision.vec4, device=device) if recipe.rotation else None
+        halves, vec3 = recipe.integrator == VERLET, precision.vec3
+        self.half_motion = wp.zeros(number, dtype=vec3, device=device) if halves else None
+        self.half_spin = wp.zeros(number, dtype=vec3, device=device) if halves and recipe.rotation else None
         self.material = wp.zeros(number, dtype=int, device=device) if recipe.materials else None
         self.identity = wp.zeros(number, dtype=int, device=device)
         self.came_from = wp.zeros(number, dtype=int, device=device)
@@ -43,7 +48,8 @@ class Grains:
     @property
     def sorted_arrays(self) -> list[wp.array]:
         """All arrays that are renumbered together."""
-        arrays = [self.place, self.remainder, self.motion, self.spin, self.material, self.identity, self.came_from]
+        arrays = [self.place, self.remainder, self.motion, self.spin, self.half_motion, self.half_spin]
+        arrays += [self.material, self.identity, self.came_from]
         return [array for array in arrays if array is not None]
 
     def load(self, table: GrainTable) -> None:
@@ -58,6 +64,10 @@ class Grains:
         if self.spin is not None:
             inertia = 0.4 * table.mass * table.radius**2
             self.spin.assign(np.column_stack([table.spin, inertia]).astype(precision.numpy_real))
+        if self.half_motion is not None:
+            self.half_motion.assign(table.velocity.astype(precision.numpy_real))
+        if self.half_spin is not None:
+            self.half_spin.assign(table.spin.astype(precision.numpy_real))
         if self.material is not None:
             self.material.assign(table.material)
         self.identity.assign(np.arange(number))

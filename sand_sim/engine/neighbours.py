@@ -4,6 +4,8 @@ from functools import cache
 
 import warp as wp
 
+from sand_sim.contact.response import memory_type
+from sand_sim.engine.act import build_swapped
 from sand_sim.engine.cells import cell_functions, level_type
 from sand_sim.engine.contact_list import listed_at
 from sand_sim.engine.count import share_out
@@ -19,7 +21,8 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
     own level and at all cells around it in coarser levels. The first pass counts, the second (``filling``) writes the list.
     """
     precision, history = recipe.precision, recipe.history
-    real, vec3, whole3, whole4 = precision.real, precision.vec3, precision.whole3, precision.whole4
+    real, whole3, whole4 = precision.real, precision.whole3, precision.whole4
+    memory_vector, swapped = memory_type(recipe.contact, precision), build_swapped(recipe)
     level = level_type(precision)
     level_of, cell_of = cell_functions(precision)
 
@@ -37,11 +40,11 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         starts: wp.array(dtype=int),
         owner: wp.array(dtype=int),
         partner: wp.array(dtype=int),
-        spring: wp.array(dtype=vec3),
+        memory: wp.array(dtype=memory_vector),
         came_from: wp.array(dtype=int),
         old_starts: wp.array(dtype=int),
         old_partner: wp.array(dtype=int),
-        old_spring: wp.array(dtype=vec3),
+        old_memory: wp.array(dtype=memory_vector),
     ):
         for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
             here = place[i]
@@ -76,15 +79,15 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                                 owner[found] = i
                                 partner[found] = j
                                 if wp.static(history):
-                                    kept = vec3(real(0.0))
+                                    kept = memory_vector()
                                     old = listed_at(old_starts, old_partner, came_from[i], came_from[j])
                                     if old >= 0:
-                                        kept = old_spring[old]
+                                        kept = old_memory[old]
                                     else:
                                         old = listed_at(old_starts, old_partner, came_from[j], came_from[i])
                                         if old >= 0:
-                                            kept = -old_spring[old]
-                                    spring[found] = kept
+                                            kept = swapped(old_memory[old])
+                                    memory[found] = kept
                             found += 1
             if wp.static(not filling):
                 counts[i] = found

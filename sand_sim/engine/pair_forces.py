@@ -4,9 +4,8 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.contact import contact_types
-from sand_sim.contact.response import build_meeting
-from sand_sim.engine.act import build_act
+from sand_sim.contact.response import build_meeting, memory_type
+from sand_sim.engine.act import build_act, build_acts
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.recipe import Recipe
 from sand_sim.precision import Precision
@@ -62,9 +61,9 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     """Kernel for the forces between grains."""
     precision, rotation, materials = recipe.precision, recipe.rotation, recipe.materials
     real, vec3, vec4, whole4 = precision.real, precision.vec3, precision.vec4, precision.whole4
-    types = contact_types(precision)
+    types, memory_vector = recipe.contact.types(precision), memory_type(recipe.contact, precision)
     excess_of, direction = build_excess(precision), build_direction(precision)
-    meeting = build_meeting(precision)
+    meeting, acts = build_meeting(precision), build_acts(recipe)
     act, release = build_act(recipe, measuring)
 
     @kernel
@@ -82,9 +81,10 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
         kinds: int,
         quantum: real,
         dt: real,
-        spring: wp.array(dtype=vec3),
+        memory: wp.array(dtype=memory_vector),
         force: wp.array(dtype=vec3),
         couple: wp.array(dtype=vec4),
+        moment: wp.array(dtype=vec3),
         deepest: wp.array(dtype=real),
         energy: wp.array(dtype=real),
     ):
@@ -94,7 +94,7 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
             at_a = place[a]
             at_b = place[b]
             excess = excess_of(at_a, at_b)
-            if excess > real(0.0):
+            if acts(contact, excess > real(0.0), memory):
                 apart = vec3(real(at_a[0] - at_b[0]), real(at_a[1] - at_b[1]), real(at_a[2] - at_b[2]))
                 span = real(at_a[3] + at_b[3])
                 normal, distance = direction(apart)
@@ -106,6 +106,7 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                 of_a = motion[a]
                 of_b = motion[b]
                 velocity = vec3(of_a[0] - of_b[0], of_a[1] - of_b[1], of_a[2] - of_b[2])
+                relative_spin = vec3(real(0.0))
                 if wp.static(rotation):
                     spin_a = spin[a]
                     spin_b = spin[b]
@@ -117,9 +118,11 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                         spin_a[2] * arm_a + spin_b[2] * arm_b,
                     )
                     velocity -= wp.cross(turning, normal)
+                    relative_spin = vec3(spin_a[0] - spin_b[0], spin_a[1] - spin_b[1], spin_a[2] - spin_b[2])
+                least = wp.min(radius_a, radius_b)
                 radius = radius_a * radius_b / reach
                 mass = of_a[3] * of_b[3] / (of_a[3] + of_b[3])
-                met = meeting(normal, overlap, velocity, radius, mass)
+                met = meeting(normal, overlap, velocity, relative_spin, radius, least, mass)
                 pair = table[0]
                 if wp.static(materials):
                     pair = table[material[a] * kinds + material[b]]
@@ -130,14 +133,15 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     dt,
                     half,
                     lane,
-                    overlap / wp.min(radius_a, radius_b),
-                    spring,
+                    overlap / least,
+                    memory,
                     force,
                     couple,
+                    moment,
                     deepest,
                     energy,
                 )
             else:
-                release(contact, spring, force, couple, energy)
+                release(contact, memory, force, couple, moment, energy)
 
     return pair_forces

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from sand_sim.contact.response import ContactModel
+from sand_sim.contact.model import ContactModel
+from sand_sim.integrator import VERLET
 from sand_sim.precision import SINGLE, Precision
 
 
@@ -14,11 +15,13 @@ class Recipe:
         contact: one law per slot.
         precision: number types.
         materials: grains are of more than one material.
+        integrator: one of ``integrator.INTEGRATORS``.
     """
 
     contact: ContactModel = field(default_factory=ContactModel)
     precision: Precision = SINGLE
     materials: bool = False
+    integrator: str = VERLET
 
     @property
     def rotation(self) -> bool:

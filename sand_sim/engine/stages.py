@@ -11,6 +11,7 @@ from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_lay_cells
 from sand_sim.engine.contact_list import ContactList, record_count, record_fill
 from sand_sim.engine.sorting import record_sort
+from sand_sim.integrator import VERLET
 
 
 @dataclass(frozen=True)
@@ -83,27 +84,23 @@ def record_renewal(arrays: DemArrays, stages: Stages, recorder) -> None:
 
 
 def record_measurement(arrays: DemArrays, stages: Stages, recorder) -> None:
-    """Record the sums from which energies, top speed and touching contacts are read."""
-    grains, setting = arrays.grains, arrays.setting
-    recorder.share(
-        energy.build_grain_energy(arrays.recipe),
-        [
-            grains.active.spans,
-            grains.place,
-            grains.motion,
-            grains.spin,
-            arrays.recipe.precision.vec3(*setting.gravity),
-            arrays.lattice.quantum,
-            arrays.grain_blocks,
-            arrays.fastest,
-        ],
-    )
+    """Record what an observer wants: forces and velocities of now, energies, top speed, touching contacts."""
+    grains, setting, recipe = arrays.grains, arrays.setting, arrays.recipe
+    gravity = recipe.precision.vec3(*setting.gravity)
     pair_stage(arrays, recorder, measuring=True)
     if arrays.walls:
         wall_stage(arrays, recorder, measuring=True)
     if arrays.tools:
         tool_stage(arrays, recorder, measuring=True)
-    recorder.wait()
+        recorder.once(finish.sum_wrenches, [arrays.tool_list.pairs.spans, arrays.wrench_blocks, arrays.tools.wrench])
+    if recipe.integrator == VERLET:
+        inputs = [grains.place, grains.motion, grains.spin, grains.half_motion, grains.half_spin, *_gathered(arrays)]
+        inputs += [gravity, setting.dt, arrays.lattice.quantum, arrays.flags.starting, arrays.seen_motion, arrays.seen_spin]
+        complete = motion.build_complete_step(recipe, bool(arrays.walls), bool(arrays.tools))
+        recorder.each(complete, grains.active, inputs)
+    inputs = [grains.active.spans, grains.place, arrays.seen_motion, arrays.seen_spin, grains.spin]
+    inputs += [gravity, arrays.lattice.quantum, arrays.grain_blocks, arrays.fastest]
+    recorder.share(energy.build_grain_energy(recipe), inputs)
     for name, contacts in arrays.lists.items():
         inputs = [contacts.pairs.spans, arrays.energy[name], arrays.energy_blocks[name]]
         recorder.share(energy.build_contact_energy(arrays.recipe.precision), inputs)
@@ -127,15 +124,15 @@ def sort_stage(arrays: DemArrays, recorder) -> None:
 def list_stage(arrays: DemArrays, recorder) -> None:
     """Find what each grain may touch among grains and walls; count first, so that nothing is written unless all of it fits."""
     grains, flags, cells = arrays.grains, arrays.flags, arrays.cells
-    active, skin, quantum = grains.active, arrays.setting.skin, arrays.lattice.quantum
+    active, gap, quantum = grains.active, arrays.setting.listing_gap, arrays.lattice.quantum
 
     def pairs(filling):
-        inputs = [grains.place, cells.levels, cells.low, arrays.in_cells.starts, skin / quantum]
+        inputs = [grains.place, cells.levels, cells.low, arrays.in_cells.starts, gap / quantum]
         inputs += _list_arguments(arrays, arrays.pair_list)
         recorder.each(neighbours.build_search(arrays.recipe, filling), active, inputs)
 
     def walls(filling):
-        inputs = [grains.place, arrays.walls, quantum, skin, *_list_arguments(arrays, arrays.wall_list)]
+        inputs = [grains.place, arrays.walls, quantum, gap, *_list_arguments(arrays, arrays.wall_list)]
         recorder.each(surfaces.build_surface_search(arrays.recipe, filling), active, inputs)
 
     def fill():
@@ -162,7 +159,7 @@ def tool_list_stage(arrays: DemArrays, recorder) -> None:
 
     def search(filling):
         inputs = [grains.origin, tools.shapes, tools.states, tools.cell_starts, tools.particles]
-        inputs += [arrays.lattice.quantum, arrays.setting.skin, *_list_arguments(arrays, arrays.tool_list)]
+        inputs += [arrays.lattice.quantum, arrays.setting.listing_gap, *_list_arguments(arrays, arrays.tool_list)]
         recorder.each(tool_contacts.build_tool_search(arrays.recipe, filling), grains.active, inputs)
 
     def fill():
@@ -196,18 +193,14 @@ def tool_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
     inputs = [*_grain_arguments(arrays, contacts), tools.shapes, tools.states, tools.particles, tools.tool_of]
     inputs += [arrays.lever, *_act_arguments(arrays, "tool")]
     recorder.each(tool_contacts.build_tool_forces(arrays.recipe, measuring), contacts.pairs, inputs)
-    if not measuring:
-        sums = [contacts.pairs.spans, contacts.partner, tools.tool_of, contacts.force, arrays.lever, tools.number]
-        blocks = tool_contacts.build_wrench_blocks(arrays.recipe)
-        recorder.share(blocks, [*sums, arrays.wrench_blocks], wait=False)
+    sums = [contacts.pairs.spans, contacts.partner, tools.tool_of, contacts.force, contacts.moment]
+    sums += [arrays.lever, tools.number, arrays.wrench_blocks]
+    recorder.share(tool_contacts.build_wrench_blocks(arrays.recipe), sums, wait=measuring)
 
 
 def move_stage(arrays: DemArrays, recorder) -> None:
     """Advance all grains."""
     grains, lattice, setting, precision = arrays.grains, arrays.lattice, arrays.setting, arrays.recipe.precision
-    gathered = [
-        [c.starts, c.force, c.couple] if c else [None, None, None] for c in (arrays.pair_list, arrays.wall_list, arrays.tool_list)
-    ]
     recorder.each(
         motion.build_move_grains(arrays.recipe, walls=bool(arrays.walls), tools=bool(arrays.tools)),
         grains.active,
@@ -216,18 +209,17 @@ def move_stage(arrays: DemArrays, recorder) -> None:
             grains.remainder,
             grains.motion,
             grains.spin,
+            grains.half_motion,
+            grains.half_spin,
             grains.origin,
-            *gathered[0],
-            arrays.met.starts,
-            arrays.met.order,
-            *gathered[1],
-            *gathered[2],
+            *_gathered(arrays),
             precision.vec3(*setting.gravity),
             setting.dt,
             lattice.quantum,
             precision.whole3(*lattice.half_extent.tolist()),
             lattice.end,
             0.5 * setting.skin / lattice.quantum,
+            arrays.flags.starting,
             arrays.flags.grains_moved,
             arrays.flags.fault,
         ],
@@ -238,9 +230,10 @@ def finish_stage(arrays: DemArrays, recorder) -> None:
     """Sum the wrenches, count the step, move the tools on."""
     flags, tools, dt = arrays.flags, arrays.tools, arrays.setting.dt
     if tools:
-        inputs = [arrays.tool_list.pairs.spans, arrays.wrench_blocks, dt, tools.tracks, flags.steps_done]
-        recorder.once(finish.sum_wrenches, [*inputs, tools.wrench, tools.impulse, tools.work], wait=False)
-    ending = [flags.steps_done, flags.steps_left, flags.fault, flags.running]
+        recorder.once(finish.sum_wrenches, [arrays.tool_list.pairs.spans, arrays.wrench_blocks, tools.wrench], wait=False)
+        inputs = [dt, tools.tracks, flags.steps_done, tools.wrench, tools.impulse, tools.work]
+        recorder.once(finish.sum_impulses, inputs, wait=False)
+    ending = [flags.steps_done, flags.steps_left, flags.starting, flags.fault, flags.running]
     recorder.once(finish.finish_step, ending, wait=not tools)
     if tools:
         place_tools(arrays, recorder)
@@ -273,8 +266,8 @@ def _play(arrays: DemArrays, stages: tuple[Stage, ...], recorder) -> None:
 
 
 def _list_arguments(arrays: DemArrays, contacts: ContactList) -> list:
-    written = [contacts.counts, contacts.starts, contacts.owner, contacts.partner, contacts.spring]
-    return [*written, arrays.grains.came_from, contacts.old_starts, contacts.old_partner, contacts.force]
+    written = [contacts.counts, contacts.starts, contacts.owner, contacts.partner, contacts.memory]
+    return [*written, arrays.grains.came_from, contacts.old_starts, contacts.old_partner, contacts.drawer]
 
 
 def _grain_arguments(arrays: DemArrays, contacts: ContactList) -> list:
@@ -295,4 +288,11 @@ def _grain_arguments(arrays: DemArrays, contacts: ContactList) -> list:
 
 def _act_arguments(arrays: DemArrays, name: str) -> list:
     contacts = arrays.lists[name]
-    return [contacts.spring, contacts.force, contacts.couple, arrays.deepest, arrays.energy[name]]
+    return [contacts.memory, contacts.force, contacts.couple, contacts.moment, arrays.deepest, arrays.energy[name]]
+
+
+def _gathered(arrays: DemArrays) -> list:
+    """What a grain sums over: its contacts in all lists."""
+    parts = {name: [None] * 4 for name in ("pair", "wall", "tool")}
+    parts |= {name: [one.starts, one.force, one.couple, one.moment] for name, one in arrays.lists.items()}
+    return [*parts["pair"], arrays.met.starts, arrays.met.order, *parts["wall"], *parts["tool"]]

@@ -54,9 +54,21 @@ def _counts(arrays: DemArrays) -> dict[str, Count]:
 def _whole_arrays(arrays: DemArrays) -> dict[str, wp.array]:
     """Arrays whose length does not change."""
     grains, flags, tools = arrays.grains, arrays.flags, arrays.tools
-    names = ("place", "remainder", "motion", "spin", "material", "identity", "came_from", "origin", "retired")
+    names = (
+        "place",
+        "remainder",
+        "motion",
+        "spin",
+        "half_motion",
+        "half_spin",
+        "material",
+        "identity",
+        "came_from",
+        "origin",
+        "retired",
+    )
     found = {f"grains.{name}": getattr(grains, name) for name in names}
-    found |= {f"flags.{name}": getattr(flags, name) for name in ("grains_moved", "tools_moved", "steps_done")}
+    found |= {f"flags.{name}": getattr(flags, name) for name in ("grains_moved", "tools_moved", "starting", "steps_done")}
     found |= {f"{name}.starts": contacts.starts for name, contacts in arrays.lists.items()}
     found["met.starts"] = arrays.met.starts
     if tools:
@@ -69,7 +81,7 @@ def _filled_arrays(arrays: DemArrays) -> dict[str, tuple[wp.array, Count]]:
     """Arrays of which only the first items mean something."""
     found = {"met.order": (arrays.met.order, arrays.pair_list.pairs)}
     for name, contacts in arrays.lists.items():
-        for part in ("owner", "partner", "spring"):
+        for part in ("owner", "partner", "memory"):
             if getattr(contacts, part) is not None:
                 found[f"{name}.{part}"] = (getattr(contacts, part), contacts.pairs)
     return found

@@ -4,9 +4,8 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.contact import contact_types
-from sand_sim.contact.response import build_meeting
-from sand_sim.engine.act import build_act
+from sand_sim.contact.response import build_meeting, memory_type
+from sand_sim.engine.act import build_act, build_acts
 from sand_sim.engine.contact_list import listed_at
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.recipe import Recipe
@@ -60,7 +59,7 @@ def build_surface_at(precision: Precision) -> wp.Function:
 def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
     """Kernel that counts or, ``filling``, lists the surfaces within reach of each grain."""
     precision, history = recipe.precision, recipe.history
-    real, vec3, whole4 = precision.real, precision.vec3, precision.whole4
+    real, whole4, memory_vector = precision.real, precision.whole4, memory_type(recipe.contact, precision)
     surface, surface_at = surface_type(precision), build_surface_at(precision)
 
     @kernel
@@ -76,11 +75,11 @@ def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         starts: wp.array(dtype=int),
         owner: wp.array(dtype=int),
         partner: wp.array(dtype=int),
-        spring: wp.array(dtype=vec3),
+        memory: wp.array(dtype=memory_vector),
         came_from: wp.array(dtype=int),
         old_starts: wp.array(dtype=int),
         old_partner: wp.array(dtype=int),
-        old_spring: wp.array(dtype=vec3),
+        old_memory: wp.array(dtype=memory_vector),
     ):
         for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
             here = place[i]
@@ -94,11 +93,11 @@ def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                         owner[found] = i
                         partner[found] = wall
                         if wp.static(history):
-                            kept = vec3(real(0.0))
+                            kept = memory_vector()
                             old = listed_at(old_starts, old_partner, came_from[i], wall)
                             if old >= 0:
-                                kept = old_spring[old]
-                            spring[found] = kept
+                                kept = old_memory[old]
+                            memory[found] = kept
                     found += 1
             if wp.static(not filling):
                 counts[i] = found
@@ -111,9 +110,9 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     """Kernel for the forces of surfaces on grains; a surface is flat for the law (R* is the grain's radius) and immovable."""
     precision, rotation, materials = recipe.precision, recipe.rotation, recipe.materials
     real, vec3, vec4, whole4 = precision.real, precision.vec3, precision.vec4, precision.whole4
-    types = contact_types(precision)
+    types, memory_vector = recipe.contact.types(precision), memory_type(recipe.contact, precision)
     surface, surface_at = surface_type(precision), build_surface_at(precision)
-    meeting = build_meeting(precision)
+    meeting, acts = build_meeting(precision), build_acts(recipe)
     act, release = build_act(recipe, measuring)
 
     @kernel
@@ -132,9 +131,10 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
         quantum: real,
         dt: real,
         walls: wp.array(dtype=surface),
-        spring: wp.array(dtype=vec3),
+        memory: wp.array(dtype=memory_vector),
         force: wp.array(dtype=vec3),
         couple: wp.array(dtype=vec4),
+        moment: wp.array(dtype=vec3),
         deepest: wp.array(dtype=real),
         energy: wp.array(dtype=real),
     ):
@@ -144,13 +144,15 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
             distance, normal = surface_at(wall, place[i], quantum)
             radius = real(place[i][3]) * quantum
             overlap = radius - distance
-            if overlap > real(0.0):
+            if acts(contact, overlap > real(0.0), memory):
                 of_i = motion[i]
                 velocity = vec3(of_i[0], of_i[1], of_i[2])
+                turning = vec3(real(0.0))
                 if wp.static(rotation):
-                    turning = spin[i]
-                    velocity -= wp.cross(vec3(turning[0], turning[1], turning[2]), normal) * distance
-                met = meeting(normal, overlap, velocity, radius, of_i[3])
+                    spin_i = spin[i]
+                    turning = vec3(spin_i[0], spin_i[1], spin_i[2])
+                    velocity -= wp.cross(turning, normal) * distance
+                met = meeting(normal, overlap, velocity, turning, radius, radius, of_i[3])
                 kind = int(0)
                 if wp.static(materials):
                     kind = material[i]
@@ -162,13 +164,14 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     overlap,
                     lane,
                     overlap / radius,
-                    spring,
+                    memory,
                     force,
                     couple,
+                    moment,
                     deepest,
                     energy,
                 )
             else:
-                release(contact, spring, force, couple, energy)
+                release(contact, memory, force, couple, moment, energy)
 
     return surface_forces

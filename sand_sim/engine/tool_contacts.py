@@ -8,9 +8,8 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.contact import contact_types
-from sand_sim.contact.response import build_meeting
-from sand_sim.engine.act import build_act
+from sand_sim.contact.response import build_meeting, memory_type
+from sand_sim.engine.act import build_act, build_acts
 from sand_sim.engine.contact_list import listed_at
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.pair_forces import build_direction
@@ -43,6 +42,7 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
     """
     precision, history = recipe.precision, recipe.history
     real, vec3, whole4 = precision.real, precision.vec3, precision.whole4
+    memory_vector = memory_type(recipe.contact, precision)
     shape_type, state_type = tool_types(precision)
     from_tool = build_from_tool(precision)
 
@@ -62,11 +62,11 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         starts: wp.array(dtype=int),
         owner: wp.array(dtype=int),
         partner: wp.array(dtype=int),
-        spring: wp.array(dtype=vec3),
+        memory: wp.array(dtype=memory_vector),
         came_from: wp.array(dtype=int),
         old_starts: wp.array(dtype=int),
         old_partner: wp.array(dtype=int),
-        old_spring: wp.array(dtype=vec3),
+        old_memory: wp.array(dtype=memory_vector),
     ):
         for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
             here = origin[i]
@@ -103,11 +103,11 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                                 owner[found] = i
                                 partner[found] = j
                                 if wp.static(history):
-                                    kept = vec3(real(0.0))
+                                    kept = memory_vector()
                                     old = listed_at(old_starts, old_partner, came_from[i], j)
                                     if old >= 0:
-                                        kept = old_spring[old]
-                                    spring[found] = kept
+                                        kept = old_memory[old]
+                                    memory[found] = kept
                             found += 1
             if wp.static(not filling):
                 counts[i] = found
@@ -120,9 +120,10 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     """Kernel for the forces between grains and tool particles; the tool is immovable for the law (m* is the grain's mass)."""
     precision, rotation, materials = recipe.precision, recipe.rotation, recipe.materials
     real, vec3, vec4, whole4 = precision.real, precision.vec3, precision.vec4, precision.whole4
-    types, (shape_type, state_type) = contact_types(precision), tool_types(precision)
+    types, memory_vector = recipe.contact.types(precision), memory_type(recipe.contact, precision)
+    shape_type, state_type = tool_types(precision)
     from_tool, direction = build_from_tool(precision), build_direction(precision)
-    meeting = build_meeting(precision)
+    meeting, acts = build_meeting(precision), build_acts(recipe)
     act, release = build_act(recipe, measuring)
 
     @kernel
@@ -145,9 +146,10 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
         particles: wp.array(dtype=vec3),
         tool_of: wp.array(dtype=int),
         lever: wp.array(dtype=vec3),
-        spring: wp.array(dtype=vec3),
+        memory: wp.array(dtype=memory_vector),
         force: wp.array(dtype=vec3),
         couple: wp.array(dtype=vec4),
+        moment: wp.array(dtype=vec3),
         deepest: wp.array(dtype=real),
         energy: wp.array(dtype=real),
     ):
@@ -162,17 +164,21 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
             apart = from_tool(here, state, quantum) - arm
             radius = real(here[3]) * quantum
             reach = radius + shape.radius
-            if wp.dot(apart, apart) < reach * reach:
+            if acts(contact, wp.dot(apart, apart) < reach * reach, memory):
                 normal, distance = direction(apart)
-                overlap = wp.max(reach - distance, real(0.0))
+                overlap = reach - distance
                 half = real(0.5) * overlap
                 point = arm + normal * (shape.radius - half)
                 of_i = motion[i]
                 velocity = vec3(of_i[0], of_i[1], of_i[2]) - state.velocity - wp.cross(state.spin, point)
+                turning = -state.spin
                 if wp.static(rotation):
-                    turning = spin[i]
-                    velocity -= wp.cross(vec3(turning[0], turning[1], turning[2]), normal) * (radius - half)
-                met = meeting(normal, overlap, velocity, radius * shape.radius / reach, of_i[3])
+                    spin_i = vec3(spin[i][0], spin[i][1], spin[i][2])
+                    turning += spin_i
+                    velocity -= wp.cross(spin_i, normal) * (radius - half)
+                met = meeting(
+                    normal, overlap, velocity, turning, radius * shape.radius / reach, wp.min(radius, shape.radius), of_i[3]
+                )
                 kind = int(0)
                 if wp.static(materials):
                     kind = material[i]
@@ -185,15 +191,16 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     half,
                     lane,
                     overlap / radius,
-                    spring,
+                    memory,
                     force,
                     couple,
+                    moment,
                     deepest,
                     energy,
                 )
             else:
                 lever[contact] = vec3(real(0.0))
-                release(contact, spring, force, couple, energy)
+                release(contact, memory, force, couple, moment, energy)
 
     return tool_forces
 
@@ -204,7 +211,7 @@ def build_wrench_blocks(recipe: Recipe) -> wp.Kernel:
 
     ``blocks`` has shape (blocks * tools, 2): force [N] and torque [N m] about the tool frame's origin, world frame.
     """
-    vec3 = recipe.precision.vec3
+    vec3, couples = recipe.precision.vec3, recipe.contact.couples
 
     @kernel
     def wrench_blocks(
@@ -214,6 +221,7 @@ def build_wrench_blocks(recipe: Recipe) -> wp.Kernel:
         partner: wp.array(dtype=int),
         tool_of: wp.array(dtype=int),
         force: wp.array(dtype=vec3),
+        moment: wp.array(dtype=vec3),
         lever: wp.array(dtype=vec3),
         tools: int,
         blocks: wp.array2d(dtype=wp.vec3d),
@@ -228,6 +236,8 @@ def build_wrench_blocks(recipe: Recipe) -> wp.Kernel:
             for contact in range(first, wp.min(first + wp.static(SUM_BLOCK), pairs)):
                 push = force[contact]
                 torque = wp.cross(lever[contact], push)
+                if wp.static(couples):
+                    torque += moment[contact]
                 row = block * tools + tool_of[partner[contact]]
                 blocks[row, 0] = blocks[row, 0] - wp.vec3d(wp.float64(push[0]), wp.float64(push[1]), wp.float64(push[2]))
                 blocks[row, 1] = blocks[row, 1] - wp.vec3d(wp.float64(torque[0]), wp.float64(torque[1]), wp.float64(torque[2]))

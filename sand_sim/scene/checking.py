@@ -2,6 +2,7 @@
 
 from itertools import combinations_with_replacement
 
+from sand_sim.contact.law import ASKS
 from sand_sim.scene.types import Scene, SceneError
 
 
@@ -51,5 +52,25 @@ def _check_pairs(scene: Scene, known: set[str]) -> None:
     others = {b.material for b in scene.boundaries} | {t.material for t in scene.tools}
     needed = list(combinations_with_replacement(grains, 2)) + [(g, o) for g in grains for o in sorted(others)]
     for a, b in needed:
+        asked = scene.contact.asks
         if {a, b} not in given:
-            raise SceneError(f"pairs: no entry for '{a}' and '{b}', which can meet; add one with restitution and friction")
+            raise SceneError(f"pairs: no entry for '{a}' and '{b}', which can meet; add one with {_listing(asked)}")
+        numbers = scene.pair(a, b).numbers
+        for name in asked:
+            if name not in numbers:
+                slots = [slot for slot, law in scene.contact.laws.items() if name in law.asks]
+                chosen = f"contact.{slots[0]} '{getattr(scene.contact, slots[0])}'"
+                unit = f" [{ASKS[name].unit}]" if ASKS[name].unit else ""
+                raise SceneError(f"pairs: '{a}' and '{b}' have no '{name}', which {chosen} needs; add {name}{unit}")
+    if scene.contact.cohesion == "capillary" and scene.liquid is None:
+        raise SceneError("liquid: contact.cohesion 'capillary' needs it; add 'liquid: {saturation: ...}'")
+    if scene.contact.twisting == "marshall" and not scene.contact.tangential.startswith("mindlin"):
+        raise SceneError("contact.twisting: 'marshall' is the twist of Mindlin's law; choose contact.tangential 'mindlin'")
+    if scene.contact.cohesion == "jkr" and scene.contact.normal == "linear":
+        raise SceneError(
+            "contact.cohesion: 'jkr' widens a Hertz contact; choose contact.normal 'hertz', or contact.cohesion 'dmt'"
+        )
+
+
+def _listing(names: tuple[str, ...]) -> str:
+    return " and ".join(filter(None, [", ".join(names[:-1]), names[-1] if names else "no numbers"]))

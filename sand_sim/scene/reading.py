@@ -5,15 +5,16 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from sand_sim.contact.normal import NORMAL_LAWS
-from sand_sim.contact.tangential import TANGENTIAL_LAWS
+from sand_sim.contact.law import ASKS
+from sand_sim.contact.model import SLOTS, ContactModel
+from sand_sim.integrator import INTEGRATORS, VERLET
 from sand_sim.precision import PRECISIONS
 from sand_sim.scene.checking import check_scene
 from sand_sim.scene.fields import Field
 from sand_sim.scene.types import (
     Boundary,
-    Contact,
     Fill,
+    Liquid,
     Material,
     PairRule,
     Pose,
@@ -72,6 +73,7 @@ def read_scene(parsed: dict, folder: Path) -> Scene:
             "boundaries",
             "tools",
             "contact",
+            "liquid",
             "solver",
             "settle",
             "duration",
@@ -88,7 +90,8 @@ def read_scene(parsed: dict, folder: Path) -> Scene:
         fills=tuple(_fill(entry, folder) for entry in top["fills"].entries()),
         boundaries=tuple(_boundary(entry) for entry in top["boundaries"].entries()) if "boundaries" in top else (),
         tools=tuple(_tool(name, entry) for name, entry in top["tools"].items()) if "tools" in top else (),
-        contact=top.optional("contact", _contact, Contact()),
+        contact=top.optional("contact", _contact, ContactModel()),
+        liquid=top.optional("liquid", _liquid, None),
         solver=top.optional("solver", _solver, Solver()),
         settle=top.optional("settle", _settle, Settle()),
         duration=top.optional("duration", lambda f: f.number(above=0.0, unit="s"), 1.0),
@@ -110,14 +113,15 @@ def _material(name: str, entry: Field) -> Material:
 
 
 def _pair(entry: Field) -> PairRule:
-    entry.keys(("between", "restitution", "friction"), required=("between", "restitution", "friction"))
+    entry.keys(("between", *ASKS), required=("between",))
     names = entry["between"].entries()
     if len(names) != 2:
         raise entry["between"].refuse("must name two materials")
     return PairRule(
         between=(names[0].text(), names[1].text()),
-        restitution=entry["restitution"].number(above=0.0, most=1.0),
-        friction=entry["friction"].number(least=0.0),
+        numbers={
+            name: entry[name].number(ask.above, ask.least, ask.most, ask.unit) for name, ask in ASKS.items() if name in entry
+        },
     )
 
 
@@ -249,16 +253,22 @@ def _tool(name: str, entry: Field) -> Tool:
     )
 
 
-def _contact(entry: Field) -> Contact:
-    entry.keys(("normal", "tangential"))
-    return Contact(
-        normal=entry.optional("normal", lambda f: f.choice(NORMAL_LAWS), "hertz"),
-        tangential=entry.optional("tangential", lambda f: f.choice(TANGENTIAL_LAWS), "mindlin"),
+def _contact(entry: Field) -> ContactModel:
+    entry.keys(SLOTS)
+    return ContactModel(**{slot: entry[slot].choice(laws) for slot, laws in SLOTS.items() if slot in entry})
+
+
+def _liquid(entry: Field) -> Liquid:
+    entry.keys(("saturation", "surface_tension", "contact_angle"), required=("saturation",))
+    return Liquid(
+        saturation=entry["saturation"].number(above=0.0, most=0.3),  # the pendular regime, where liquid sits in single bridges
+        surface_tension=entry.optional("surface_tension", lambda f: f.number(above=0.0, unit="N/m"), 0.072),
+        contact_angle=entry.optional("contact_angle", lambda f: f.number(least=0.0, most=0.9, unit="rad"), 0.0),
     )
 
 
 def _solver(entry: Field) -> Solver:
-    entry.keys(("time_step", "skin", "precision", "device", "threads"))
+    entry.keys(("time_step", "skin", "integrator", "precision", "device", "threads"))
 
     def auto(key, read):
         return None if entry.value.get(key) == "auto" else entry.optional(key, read, None)
@@ -266,6 +276,7 @@ def _solver(entry: Field) -> Solver:
     return Solver(
         time_step=auto("time_step", lambda f: f.number(above=0.0, unit="s")),
         skin=auto("skin", lambda f: f.number(above=0.0, unit="m")),
+        integrator=entry.optional("integrator", lambda f: f.choice(INTEGRATORS), VERLET),
         precision=entry.optional("precision", lambda f: f.choice(PRECISIONS), "single"),
         device=entry.optional("device", Field.text, "auto"),
         threads=auto("threads", lambda f: f.whole(1)),

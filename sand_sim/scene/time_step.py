@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sand_sim.contact.law import PairNumbers
+from sand_sim.contact.model import ContactModel
+from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.types import Material, Scene, SceneError
 
 CONTACT_FRACTION = 1.0 / 25.0  # of the shortest contact time
@@ -12,20 +15,35 @@ REFUSED = 3.0  # times the chosen step: a user's step beyond is refused
 WARNED = 1.0  # times the chosen step: a user's step beyond is warned about
 
 
-def effective_young(a: Material, b: Material) -> float:
-    """``E* = [(1 - nu_a^2)/E_a + (1 - nu_b^2)/E_b]^-1`` [Pa]."""
-    return 1.0 / ((1.0 - a.poisson**2) / a.young + (1.0 - b.poisson**2) / b.young)
-
-
-def effective_shear(a: Material, b: Material) -> float:
-    """``G* = [(2 - nu_a)/G_a + (2 - nu_b)/G_b]^-1`` with ``G = E / (2 (1 + nu))`` [Pa]."""
-    shear_a, shear_b = (m.young / (2.0 * (1.0 + m.poisson)) for m in (a, b))
-    return 1.0 / ((2.0 - a.poisson) / shear_a + (2.0 - b.poisson) / shear_b)
-
-
 def contact_time(radius: float, mass: float, young: float, speed: float) -> float:
     """Duration of an elastic Hertz impact, ``2.868 (m*^2 / (R* E*^2 v))^0.2`` [s]."""
     return 2.868 * (mass**2 / (radius * young**2 * speed)) ** 0.2
+
+
+def shortest_oscillation(model: ContactModel, pair: PairNumbers, radius: float, mass: float, speed: float) -> float:
+    """Shortest half period among the springs of a contact, and the decay times of its history-free dampers [s].
+
+    Args:
+        model: laws.
+        pair: of the two materials.
+        radius: effective, of the smallest spheres that meet [m].
+        mass: effective [kg].
+        speed: at impact [m/s].
+    """
+    numbers = pair.given
+    if model.normal == "linear":
+        shortest = np.pi * np.sqrt(mass / numbers["stiffness"])
+    else:
+        shortest = contact_time(radius, mass, pair.young, speed)
+    # A sphere yields to a push in the tangent plane by turning too, as 2/7 of its mass would.
+    if model.tangential == "linear":
+        shortest = min(shortest, np.pi * np.sqrt(2.0 / 7.0 * mass / numbers["shear_stiffness"]))
+    if model.tangential == "viscous" and numbers["shear_viscosity"] > 0.0:
+        shortest = min(shortest, np.pi * 2.0 / 7.0 * mass / numbers["shear_viscosity"])
+    if model.rolling == "spring":
+        # k_r / I over k_n / m is 2.25 mu_r^2 R^2 m / (2/5 m R^2).
+        shortest /= max(1.0, np.sqrt(2.25 / 0.4) * numbers["rolling_friction"])
+    return float(shortest)
 
 
 def rayleigh_time(radius: float, material: Material) -> float:
@@ -41,8 +59,8 @@ class TimeStep:
     Attributes:
         value: [s].
         safe: what ``auto`` would choose [s].
-        contact: shortest contact time at the fastest speed [s].
-        rayleigh: shortest Rayleigh time [s].
+        contact: shortest contact time at the fastest speed, or half period of a spring [s].
+        rayleigh: shortest Rayleigh time, infinite with linear springs [s].
         speed: fastest relative speed reckoned with [m/s].
         reason: which of the two decided.
         warning: empty, or what is doubtful about a step given by the user.
@@ -81,11 +99,12 @@ def choose_time_step(scene: Scene, smallest: dict[str, float], speed: float) -> 
     for grain, radius in smallest.items():
         material = named[grain]
         mass = material.density * 4.0 / 3.0 * np.pi * radius**3
-        rayleigh = min(rayleigh, float(rayleigh_time(radius, material)))
-        for other in smallest:
-            contact = min(contact, contact_time(0.5 * radius, 0.5 * mass, effective_young(material, named[other]), speed))
-        for other in surfaces:
-            contact = min(contact, contact_time(radius, mass, effective_young(material, named[other]), speed))
+        if scene.contact.normal != "linear":
+            rayleigh = min(rayleigh, float(rayleigh_time(radius, material)))
+        meetings = [(other, 0.5 * radius, 0.5 * mass) for other in smallest] + [(other, radius, mass) for other in surfaces]
+        for other, half_radius, half_mass in meetings:
+            pair = pair_numbers(scene, grain, other)
+            contact = min(contact, shortest_oscillation(scene.contact, pair, half_radius, half_mass, speed))
     safe = min(CONTACT_FRACTION * contact, RAYLEIGH_FRACTION * rayleigh)
     reason = "contact time" if CONTACT_FRACTION * contact < RAYLEIGH_FRACTION * rayleigh else "Rayleigh time"
     asked = scene.solver.time_step

@@ -5,6 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from sand_sim.contact.model import ContactModel
+from sand_sim.integrator import VERLET
+
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w as in geometry_msgs
 
@@ -28,8 +31,7 @@ class PairRule:
     """How two materials meet; valid both ways round."""
 
     between: tuple[str, str]
-    restitution: float  # [1] in (0, 1]
-    friction: float  # [1] Coulomb mu
+    numbers: dict[str, float]  # [units in ``contact.law.ASKS``] by name, those that the contact laws ask for and perhaps more
 
 
 @dataclass(frozen=True)
@@ -115,11 +117,12 @@ class Tool:
 
 
 @dataclass(frozen=True)
-class Contact:
-    """One choice per slot of the contact law."""
+class Liquid:
+    """What wets the grains."""
 
-    normal: str = "hertz"
-    tangential: str = "mindlin"
+    saturation: float  # [1] share of the pore volume that is liquid
+    surface_tension: float = 0.072  # [N/m]
+    contact_angle: float = 0.0  # [rad]
 
 
 @dataclass(frozen=True)
@@ -128,6 +131,7 @@ class Solver:
 
     time_step: float | None = None  # [s]
     skin: float | None = None  # [m]
+    integrator: str = VERLET
     precision: str = "single"
     device: str = "auto"
     threads: int | None = None
@@ -153,7 +157,8 @@ class Scene:
     tools: tuple[Tool, ...] = ()
     gravity: Vector = (0.0, 0.0, -9.81)  # [m/s^2]
     domain: tuple[Vector, Vector] | None = None  # [m] corners; grains that leave it are retired
-    contact: Contact = Contact()
+    contact: ContactModel = field(default_factory=ContactModel)
+    liquid: Liquid | None = None
     solver: Solver = Solver()
     settle: Settle = Settle()
     duration: float = 1.0  # [s] played by ``sand_sim run``

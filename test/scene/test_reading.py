@@ -41,7 +41,7 @@ def changed(path, value):
 def test_good_scene_is_read():
     scene = read_scene(copy.deepcopy(GOOD), Path.cwd())
     assert scene.materials[0].young == 1e7  # YAML reads 1e7 as text
-    assert scene.pair("sand", "steel").friction == 0.2
+    assert scene.pair("sand", "steel").numbers["friction"] == 0.2
     assert scene.gravity == (0.0, 0.0, -9.81)
     assert scene.tool("spade").scale == 1.0
 

@@ -1,86 +1,93 @@
-"""An independent DEM in NumPy, float64, all pairs: the yardstick for the kernels, written from the equations."""
+"""An independent DEM in NumPy, float64, all pairs: spheres between planes, with the laws of ``reference_laws.py``."""
+
+from collections import defaultdict
+from copy import deepcopy
 
 import numpy as np
+from reference_laws import respond
 
 
 class ReferenceDem:
-    """Frictional spheres between planes, Hertz-Mindlin with history, symplectic Euler.
+    """Frictional spheres and planes under two integrators.
 
     Args:
         position, velocity, spin: shape (n, 3) [m], [m/s], [rad/s].
         radius: shape (n,) [m].
         density: [kg/m^3].
-        young, shear: effective moduli E* and G* between grains [Pa].
-        ratio: damping ratio z of the Hertz contact [1].
-        friction: mu [1].
-        planes: list of (point, normal, E*, G*).
+        laws: name of the law per slot.
+        pair: numbers between grains, and the same between grains and planes.
+        planes: list of (point, normal).
         gravity: shape (3,) [m/s^2].
         dt: [s].
+        integrator: ``symplectic_euler`` or ``velocity_verlet``.
     """
 
-    def __init__(self, position, velocity, spin, radius, density, young, shear, ratio, friction, planes, gravity, dt):
+    def __init__(self, position, velocity, spin, radius, density, laws, pair, planes, gravity, dt, integrator):
         self.x, self.v, self.w = (np.array(a, float) for a in (position, velocity, spin))
         self.r, self.dt, self.g = np.asarray(radius, float), dt, np.asarray(gravity, float)
         self.m = density * 4.0 / 3.0 * np.pi * self.r**3
         self.inertia = 0.4 * self.m * self.r**2
-        self.young, self.shear, self.ratio, self.friction, self.planes = young, shear, ratio, friction, planes
-        n = len(self.r)
-        self.spring = np.zeros((n, n, 3))
-        self.plane_spring = np.zeros((len(planes), n, 3))
+        self.laws, self.pair, self.planes, self.integrator = laws, pair | {"dt": dt}, planes, integrator
+        self.memories = defaultdict(dict)
+        self.half = None  # velocity and spin half a step ago
 
-    def step(self):
-        """One time step."""
+    def accelerations(self):
+        """Of all grains, linear and angular."""
         force, torque = self.m[:, None] * self.g, np.zeros_like(self.x)
         n = len(self.r)
         for i in range(n):
             for j in range(i + 1, n):
                 apart = self.x[i] - self.x[j]
                 distance = np.sqrt(apart @ apart)
-                overlap = self.r[i] + self.r[j] - distance
-                if overlap <= 0.0:
-                    self.spring[i, j] = 0.0
+                overlap, normal = self.r[i] + self.r[j] - distance, apart / distance
+                if overlap < -0.5 * self.r[i]:
                     continue
-                normal = apart / distance
                 arm_i, arm_j = self.r[i] - overlap / 2.0, self.r[j] - overlap / 2.0
                 at_i = self.v[i] + np.cross(self.w[i], -arm_i * normal)
                 at_j = self.v[j] + np.cross(self.w[j], arm_j * normal)
-                radius = self.r[i] * self.r[j] / (self.r[i] + self.r[j])
-                mass = self.m[i] * self.m[j] / (self.m[i] + self.m[j])
-                contact = self._contact(normal, overlap, at_i - at_j, radius, mass, self.young, self.shear, self.spring[i, j])
-                push, drag, self.spring[i, j] = contact
-                force[i] += push + drag
-                force[j] -= push + drag
-                torque[i] += np.cross(-arm_i * normal, drag)
-                torque[j] += np.cross(arm_j * normal, -drag)
-        for k, (point, normal, young, shear) in enumerate(self.planes):
+                c = {"normal": normal, "overlap": overlap, "velocity": at_i - at_j, "spin": self.w[i] - self.w[j]}
+                c["radius"] = self.r[i] * self.r[j] / (self.r[i] + self.r[j])
+                c["mass"] = self.m[i] * self.m[j] / (self.m[i] + self.m[j])
+                c["least"] = min(self.r[i], self.r[j])
+                pull, moment = respond(self.laws, c, self.pair, self.memories[i, j])
+                force[i] += pull
+                force[j] -= pull
+                torque[i] += np.cross(-arm_i * normal, pull) + moment
+                torque[j] += np.cross(arm_j * normal, -pull) - moment
+        for k, (point, normal) in enumerate(self.planes):
             for i in range(n):
                 distance = (self.x[i] - point) @ normal
                 overlap = self.r[i] - distance
-                if overlap <= 0.0:
-                    self.plane_spring[k, i] = 0.0
+                if overlap < -0.5 * self.r[i]:
                     continue
                 at = self.v[i] + np.cross(self.w[i], -distance * normal)
-                contact = self._contact(normal, overlap, at, self.r[i], self.m[i], young, shear, self.plane_spring[k, i])
-                push, drag, self.plane_spring[k, i] = contact
-                force[i] += push + drag
-                torque[i] += np.cross(-distance * normal, drag)
-        self.v += force / self.m[:, None] * self.dt
-        self.w += torque / self.inertia[:, None] * self.dt
-        self.x += self.v * self.dt
+                c = {"normal": normal, "overlap": overlap, "velocity": at, "spin": self.w[i]}
+                c |= {"radius": self.r[i], "mass": self.m[i], "least": self.r[i]}
+                pull, moment = respond(self.laws, c, self.pair, self.memories["plane", k, i])
+                force[i] += pull
+                torque[i] += np.cross(-distance * normal, pull) + moment
+        return force / self.m[:, None], torque / self.inertia[:, None]
 
-    def _contact(self, normal, overlap, velocity, radius, mass, young, shear, spring):
-        approach = velocity @ normal
-        slip = velocity - approach * normal
-        patch = np.sqrt(radius * overlap)
-        push = 4.0 / 3.0 * young * np.sqrt(radius) * overlap**1.5
-        push -= 2.0 * self.ratio * np.sqrt(2.0 * young * patch * mass) * approach
-        push = max(push, 0.0)
-        stiffness = 8.0 * shear * patch
-        viscosity = 2.0 * self.ratio * np.sqrt(stiffness * mass)
-        spring = spring - (spring @ normal) * normal + slip * self.dt
-        drag = -stiffness * spring - viscosity * slip
-        size = np.sqrt(drag @ drag)
-        if size > self.friction * push:
-            drag = drag * (self.friction * push / size)
-            spring = -(drag + viscosity * slip) / stiffness
-        return push * normal, drag, spring
+    def step(self):
+        """One time step."""
+        linear, angular = self.accelerations()
+        if self.integrator == "symplectic_euler":
+            self.v += linear * self.dt
+            self.w += angular * self.dt
+            self.x += self.v * self.dt
+            return
+        first = self.half is None
+        v, w = (self.v, self.w) if first else self.half
+        kick = 0.5 * self.dt if first else self.dt
+        self.half = v + kick * linear, w + kick * angular
+        self.x += self.half[0] * self.dt
+        self.v, self.w = self.half[0] + 0.5 * self.dt * linear, self.half[1] + 0.5 * self.dt * angular
+
+    def seen(self):
+        """Velocity and spin of now, shape (n, 3) each: the half steps of velocity Verlet completed with the forces of now."""
+        if self.half is None:
+            return self.v, self.w
+        kept = deepcopy(self.memories)
+        linear, angular = self.accelerations()
+        self.memories = kept
+        return self.half[0] + 0.5 * self.dt * linear, self.half[1] + 0.5 * self.dt * angular

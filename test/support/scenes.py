@@ -28,18 +28,19 @@ class SceneMaker:
         self.number += 1
         file = self.folder / f"grains_{self.number}.npz"
         np.savez(file, **columns)
-        restitution, friction = further.pop("restitution", 0.5), further.pop("friction", 0.5)
+        numbers = {"restitution": further.pop("restitution", 0.5), "friction": further.pop("friction", 0.5)}
+        numbers |= further.pop("numbers", {})
         wall = further.pop("wall", {"density": 2500.0, "young": RIGID, "poisson": 0.3})
         solver = {"precision": further.pop("precision", "double")}
-        for name in ("time_step", "skin", "threads"):
+        for name in ("time_step", "skin", "threads", "integrator"):
             if name in further:
                 solver[name] = further.pop(name)
         parsed = {
             "gravity": further.pop("gravity", [0.0, 0.0, 0.0]),
             "materials": {"grain": material or {"density": 2500.0, "young": 1e7, "poisson": 0.25}, "wall": wall},
             "pairs": [
-                {"between": ["grain", "grain"], "restitution": restitution, "friction": friction},
-                {"between": ["grain", "wall"], "restitution": restitution, "friction": friction},
+                {"between": ["grain", "grain"]} | numbers,
+                {"between": ["grain", "wall"]} | numbers,
             ],
             "fills": [{"material": "grain", "file": str(file)}],
             "solver": solver,

@@ -1,0 +1,161 @@
+"""Rolling and twisting resistance.
+
+Rolling: ``(contact, pair, normal_force, memory, dt) -> (moment [N m], memory)``, twisting the same; the moment acts on body a,
+its opposite on body b. Rolling resists the part of the relative angular velocity in the tangent plane, twisting the part along
+the normal.
+"""
+
+import warp as wp
+
+from sand_sim.contact.contact import ContactTypes
+from sand_sim.contact.law import NONE, VECTOR, Law, PairNumbers
+from sand_sim.contact.tangential import TANGENTIAL_LAWS, build_bounded, build_turned
+from sand_sim.precision import Precision
+
+_ROLLING_DAMPING = 0.3  # share of critical in the spring-dashpot law
+
+
+def build_constant(precision: Precision, types: ContactTypes) -> wp.Function:
+    """Constant rolling torque against the rolling motion.
+
+    ``M = -mu_r R* F_n w / |w|`` with w the relative angular velocity in the tangent plane. It stops rolling grains; grains at
+    rest rattle under it, because its sign follows the smallest motion.
+
+    Source: Zhou et al. 1999, https://doi.org/10.1016/S0378-4371(99)00183-1; model A of Ai et al. 2011,
+    https://doi.org/10.1016/j.powtec.2010.09.030.
+    """
+    real, vec3 = precision.real, precision.vec3
+
+    @wp.func
+    def constant(contact: types.contact, pair: types.pair, normal_force: real, memory: vec3, dt: real):
+        rolling = contact.turning - contact.normal * wp.dot(contact.turning, contact.normal)
+        rate = wp.length(rolling)
+        moment = vec3(real(0.0))
+        if rate > real(0.0):
+            moment = rolling * (-pair.rolling_friction * contact.radius * normal_force / rate)
+        return moment, memory
+
+    return constant
+
+
+def build_spring(precision: Precision, types: ContactTypes) -> wp.Function:
+    """Elastic-plastic spring-dashpot against rolling (EPSD).
+
+    ``M = -k_r p - c_r w`` with the rolled angle p, ``k_r = 2.25 S (mu_r R*)^2`` (S = 2 E* a the normal tangent stiffness), c_r a
+    fixed share of critical, and ``|M| <= mu_r R* F_n``. A sphere rests on a slope up to ``tan(slope) = mu_r``.
+
+    Source: model C of Ai et al. 2011, https://doi.org/10.1016/j.powtec.2010.09.030, after Iwashita & Oda 1998.
+    """
+    real, vec3, damping = precision.real, precision.vec3, _ROLLING_DAMPING
+    bounded, turned = build_bounded(precision), build_turned(precision)
+
+    @wp.func
+    def spring(contact: types.contact, pair: types.pair, normal_force: real, memory: vec3, dt: real):
+        rolling = contact.turning - contact.normal * wp.dot(contact.turning, contact.normal)
+        arm = pair.rolling_friction * contact.radius
+        stiffness = real(2.25) * arm * arm * pair.rolling_young * contact.patch
+        # 7/5 m r^2 is the inertia of a sphere about its contact point.
+        inertia = real(7.0) / real(5.0) * contact.mass * contact.least * contact.least
+        viscous = rolling * (real(2.0) * real(wp.static(damping)) * wp.sqrt(stiffness * inertia))
+        rolled = turned(memory, contact.normal) + rolling * dt
+        moment = -rolled * stiffness - viscous
+        if stiffness > real(0.0):
+            moment, rolled = bounded(moment, viscous, rolled, stiffness, arm * normal_force)
+        return moment, rolled
+
+    return spring
+
+
+def build_spring_energy(precision: Precision, types: ContactTypes) -> wp.Function:
+    """Energy of the rolling spring, ``k_r p^2 / 2``."""
+    real, vec3 = precision.real, precision.vec3
+
+    @wp.func
+    def spring_energy(contact: types.contact, pair: types.pair, rolled: vec3) -> real:
+        arm = pair.rolling_friction * contact.radius
+        return real(1.125) * arm * arm * pair.rolling_young * contact.patch * wp.dot(rolled, rolled)
+
+    return spring_energy
+
+
+def prepare_constant(pair: PairNumbers) -> dict[str, float]:
+    """Fields of the constant torque."""
+    return {"rolling_friction": pair.given["rolling_friction"]}
+
+
+def prepare_spring(pair: PairNumbers) -> dict[str, float]:
+    """Fields of the rolling spring."""
+    return prepare_constant(pair) | {"rolling_young": 2.0 * pair.young}
+
+
+def build_marshall(precision: Precision, types: ContactTypes) -> wp.Function:
+    """Twisting friction of a Hertz-Mindlin contact: the tangential law integrated over the patch.
+
+    ``M = -(k_t a^2 / 2) q - (c_t a^2 / 2) w_n`` with the twisted angle q, ``k_t = 8 G* a``, and ``|M| <= 2/3 a mu F_n``; it
+    has no numbers of its own.
+
+    Source: Marshall 2009, https://doi.org/10.1016/j.jcp.2008.10.020.
+    """
+    real = precision.real
+
+    @wp.func
+    def marshall(contact: types.contact, pair: types.pair, normal_force: real, twisted: real, dt: real):
+        rate = wp.dot(contact.turning, contact.normal)
+        half = real(0.5) * contact.patch * contact.patch
+        stiffness = real(8.0) * pair.shear * contact.patch * half
+        viscous = pair.shear_damping * contact.inertia * half * rate
+        angle = twisted + rate * dt
+        moment = -stiffness * angle - viscous
+        bound = real(2.0) / real(3.0) * contact.patch * pair.friction * normal_force
+        if wp.abs(moment) > bound:
+            moment = wp.sign(moment) * bound
+            if stiffness > real(0.0):
+                angle = -(moment + viscous) / stiffness
+        return contact.normal * moment, angle
+
+    return marshall
+
+
+def build_marshall_energy(precision: Precision, types: ContactTypes) -> wp.Function:
+    """Energy of the twisting spring, ``k_t a^2 q^2 / 4``."""
+    real = precision.real
+
+    @wp.func
+    def marshall_energy(contact: types.contact, pair: types.pair, twisted: real) -> real:
+        return real(2.0) * pair.shear * contact.patch * contact.patch * contact.patch * twisted * twisted
+
+    return marshall_energy
+
+
+ROLLING_LAWS = {
+    "none": NONE,
+    "constant": Law(
+        build_constant,
+        fields={"rolling_friction": "[1] mu_r"},
+        prepare=prepare_constant,
+        asks=("rolling_friction",),
+        rotation=True,
+    ),
+    "spring": Law(
+        build_spring,
+        build_spring_energy,
+        fields={"rolling_friction": "[1] mu_r", "rolling_young": "[Pa] 2 E*"},
+        prepare=prepare_spring,
+        asks=("rolling_friction",),
+        memory=VECTOR,
+        rotation=True,
+    ),
+}
+
+TWISTING_LAWS = {
+    "none": NONE,
+    "marshall": Law(
+        build_marshall,
+        build_marshall_energy,
+        fields=TANGENTIAL_LAWS["mindlin"].fields,
+        prepare=TANGENTIAL_LAWS["mindlin"].prepare,
+        asks=TANGENTIAL_LAWS["mindlin"].asks,
+        memory=(1,),
+        rotation=True,
+    ),
+}

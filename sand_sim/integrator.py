@@ -1,0 +1,3 @@
+"""Names of the integrators."""
+
+EULER, VERLET = INTEGRATORS = ("symplectic_euler", "velocity_verlet")
