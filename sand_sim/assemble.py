@@ -2,15 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import trimesh
 
 from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_body
 from sand_sim import rotation
+from sand_sim.body_model import BodyModel, model_body
 from sand_sim.engine.arrays import DemArrays, Setting
 from sand_sim.engine.device import open_device
 from sand_sim.engine.explicit_dem import ExplicitDem
+from sand_sim.engine.lanes import available_cores
 from sand_sim.engine.lattice import Lattice
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.surfaces import CYLINDER, PLANE, surface_type
@@ -24,6 +27,7 @@ from sand_sim.scene.types import Scene, SceneError, Tool
 from sand_sim.scene.walls import Wall, walls_of
 
 _SKIN = 0.25  # of the mean grain radius
+_SPHERES_PER_THREAD = 1000
 _MARGIN = 0.25  # of the scene's largest edge, free around everything in it
 
 Progress = Callable[[str, float], None]
@@ -55,9 +59,11 @@ class Assembly:
 
     Attributes:
         scene: what it was made from.
-        fill_numbers: grains of each fill; their identities follow one another.
+        fill_numbers: grains of each fill; their identities follow one another, those of the bodies come last.
+        table: grains and bodies as the scene places them.
         walls: analytic surfaces.
         tools: in the order of the scene.
+        bodies: in the order of the scene.
         time_step: chosen, with its reasons.
         frame_steps: steps per frame.
         lattice: the domain.
@@ -67,13 +73,39 @@ class Assembly:
 
     scene: Scene
     fill_numbers: list[int]
+    table: GrainTable
     walls: list[Wall]
     tools: list[ToolModel]
+    bodies: list[BodyModel]
     time_step: TimeStep
     frame_steps: int
     lattice: Lattice
     recipe: Recipe
     solver: ExplicitDem
+
+    @cached_property
+    def grain_of_sphere(self) -> np.ndarray:
+        """Grain of each sphere of the table, shape (n,), int."""
+        return self.table.grain
+
+    @cached_property
+    def lone_grain(self) -> np.ndarray:
+        """Whether a grain is a single sphere, shape (grains,)."""
+        alone = np.zeros(self.table.grains, bool)
+        alone[self.grain_of_sphere[self.table.lone]] = True
+        return alone
+
+    @cached_property
+    def grain_of_body(self) -> np.ndarray:
+        """Grain that each body is, shape (bodies,), int."""
+        return np.flatnonzero(~self.lone_grain)
+
+    @cached_property
+    def body_extent(self) -> np.ndarray:
+        """Farthest a body reaches from its centre of mass, shape (bodies,) [m]."""
+        table, extent = self.table, np.zeros(len(self.table.bodies))
+        np.maximum.at(extent, table.body[~table.lone], (np.linalg.norm(table.offset, axis=1) + table.radius)[~table.lone])
+        return extent
 
 
 def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> Assembly:
@@ -86,10 +118,6 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     Raises:
         SceneError: if a mesh, a fill or the time step cannot be used; the message names the field.
     """
-    try:
-        device = open_device(scene.solver.device, scene.solver.threads)
-    except ValueError as error:
-        raise SceneError(f"solver.device: {error}") from None
     tools = [_model_tool(tool, scene, progress) for tool in scene.tools]
     walls = [wall for boundary in scene.boundaries for wall in walls_of(boundary)]
     order = _material_order(scene)
@@ -97,7 +125,9 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         fill_grains(fill, scene.materials[scene.material_index(fill.material)], order.index(fill.material), [*walls, *tools])
         for fill in scene.fills
     ]
-    table = GrainTable.join(fills)
+    bodies = [model_body(body, scene, progress) for body in scene.bodies]
+    table = GrainTable.join([*fills, *(body.table(order.index(body.body.material)) for body in bodies)])
+    device = _open_device(scene, len(table))
     time_step, frame_steps = _time_step(scene, table, order)
     precision = PRECISIONS[scene.solver.precision]
     lattice = _lattice(scene, table, walls, tools, precision)
@@ -105,7 +135,8 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         contact=scene.contact,
         precision=precision,
         integrator=scene.solver.integrator,
-        materials=len({fill.material for fill in scene.fills}) > 1,
+        materials=len(_loose_materials(scene)) > 1,
+        bodies=len(table.bodies) > 0,
     )
     skin = scene.solver.skin or _SKIN * float(table.radius.mean())
     arrays = DemArrays(
@@ -119,8 +150,17 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         device.lanes,
         device.name,
     )
-    numbers = [len(fill) for fill in fills]
-    return Assembly(scene, numbers, walls, tools, time_step, frame_steps, lattice, recipe, ExplicitDem(arrays, device))
+    numbers, solver = [fill.grains for fill in fills], ExplicitDem(arrays, device)
+    return Assembly(scene, numbers, table, walls, tools, bodies, time_step, frame_steps, lattice, recipe, solver)
+
+
+def _open_device(scene: Scene, spheres: int):
+    """The scene's device; a small scene gets few threads, because they would wait for each other longer than they work."""
+    threads = scene.solver.threads or min(available_cores(), 1 + spheres // _SPHERES_PER_THREAD)
+    try:
+        return open_device(scene.solver.device, threads)
+    except ValueError as error:
+        raise SceneError(f"solver.device: {error}") from None
 
 
 def _model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
@@ -132,9 +172,14 @@ def _model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
     return ToolModel(tool, mesh, body)
 
 
+def _loose_materials(scene: Scene) -> set[str]:
+    """Names of the materials of everything that moves freely."""
+    return {one.material for one in (*scene.fills, *scene.bodies)}
+
+
 def _material_order(scene: Scene) -> list[str]:
     """Names of the materials, those of grains first, so that with one grain material its index is zero."""
-    grains = {fill.material for fill in scene.fills}
+    grains = _loose_materials(scene)
     return sorted((m.name for m in scene.materials), key=lambda name: name not in grains)
 
 
@@ -154,7 +199,7 @@ def _time_step(scene: Scene, table: GrainTable, order: list[str]) -> tuple[TimeS
 
 
 def _lattice(scene: Scene, table: GrainTable, walls: list[Wall], tools: list[ToolModel], precision: Precision) -> Lattice:
-    reserve = 1.05 * max((tool.extent for tool in tools), default=0.0)
+    reserve = 1.05 * max([tool.extent for tool in tools] + [float(np.linalg.norm(table.offset, axis=1).max(initial=0.0))])
     if scene.domain is not None:
         return Lattice(*(np.asarray(corner, float) for corner in scene.domain), precision, reserve)
     corners = [table.position - table.radius[:, None], table.position + table.radius[:, None]]

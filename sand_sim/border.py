@@ -42,12 +42,13 @@ class GrainCloud:
     """All grains that are in the domain, in the order of their identities.
 
     Attributes:
-        identity: number in the scene's table, shape (n,), int.
+        identity: number of the grain in the scene, shape (n,), int.
         position: shape (n, 3) [m], double.
         velocity: shape (n, 3) [m/s].
         spin: shape (n, 3) [rad/s]; zeros where grains do not turn.
-        radius: shape (n,) [m].
+        radius: shape (n,) [m]; of a rigid body, of the sphere about its centre of mass that holds it.
         mass: shape (n,) [kg].
+        orientation: principal frame to world frame, shape (n, 4); no rotation for single spheres.
     """
 
     identity: np.ndarray
@@ -56,6 +57,7 @@ class GrainCloud:
     spin: np.ndarray
     radius: np.ndarray
     mass: np.ndarray
+    orientation: np.ndarray
 
     def __len__(self) -> int:
         return len(self.identity)
@@ -93,6 +95,27 @@ class ToolReport:
     world_force: np.ndarray
     work: float
     carried: float
+
+
+@dataclass(frozen=True)
+class BodyReport:
+    """Where a free rigid body is and how it moves.
+
+    Attributes:
+        name: of the body.
+        position: of its frame's origin, shape (3,) [m].
+        orientation: body's own frame to world frame, shape (4,).
+        velocity: of its centre of mass, shape (3,) [m/s].
+        spin: world frame, shape (3,) [rad/s].
+        mass: [kg].
+    """
+
+    name: str
+    position: np.ndarray
+    orientation: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    mass: float
 
 
 @dataclass(frozen=True)
@@ -150,6 +173,8 @@ class Observation:
         tools: one report per tool, in the order of the scene.
         walls: one report per wall, in the order of the scene.
         health: error indicators.
+        bodies: one report per free rigid body of the scene that is in the domain.
+        spheres: what is drawn: all spheres, those of one body with the same identity. The same as ``grains`` without bodies.
     """
 
     time: float
@@ -158,6 +183,12 @@ class Observation:
     tools: tuple[ToolReport, ...]
     walls: tuple[WallReport, ...]
     health: Health
+    bodies: tuple[BodyReport, ...]
+    spheres: GrainCloud
+
+    def body(self, name: str) -> BodyReport:
+        """The report of a free rigid body by its name."""
+        return next(report for report in self.bodies if report.name == name)
 
     def tool(self, name: str) -> ToolReport:
         """The report of a tool by its name."""

@@ -4,14 +4,17 @@ import numpy as np
 
 from sand_sim import rotation
 from sand_sim.assemble import Assembly, ToolModel
-from sand_sim.border import GrainCloud, Health, ToolReport, WallReport
+from sand_sim.border import BodyReport, GrainCloud, Health, ToolReport, WallReport
 from sand_sim.engine.explicit_dem import Sums
 from sand_sim.track import Track
 from sand_sim.trust import find_doubts
 
 
-def observe_grains(assembly: Assembly) -> GrainCloud:
-    """All grains in the domain, in the order of their identities, as the solver has last measured them."""
+def observe_spheres(assembly: Assembly) -> GrainCloud:
+    """All spheres in the domain, in the order of the scene's table, as the solver has last measured them.
+
+    Those of one rigid body share its grain's identity; their masses are those that the contact laws see.
+    """
     arrays, lattice = assembly.solver.arrays, assembly.lattice
     grains = arrays.grains
     active = grains.active.get()
@@ -22,13 +25,55 @@ def observe_grains(assembly: Assembly) -> GrainCloud:
     place, motion = place[order], arrays.seen_motion.numpy()[order]
     spin = arrays.seen_spin.numpy()[order, :3] if grains.spin is not None else np.zeros_like(motion[:, :3])
     return GrainCloud(
-        identity=np.sort(identity),
+        identity=assembly.grain_of_sphere[np.sort(identity)],
         position=lattice.to_world(place[:, :3]),
         velocity=motion[:, :3],
         spin=spin,
         radius=(place[:, 3] * lattice.quantum).astype(motion.dtype),
-        mass=motion[:, 3],
+        mass=grains.motion.numpy()[order, 3],
+        orientation=np.tile([0.0, 0.0, 0.0, 1.0], (len(order), 1)),
     )
+
+
+def observe_grains(assembly: Assembly, spheres: GrainCloud | None = None) -> GrainCloud:
+    """All grains in the domain, in the order of their identities: single spheres, and rigid bodies as one row each.
+
+    Args:
+        assembly: the world's.
+        spheres: from ``observe_spheres``, if it is at hand.
+    """
+    spheres = spheres or observe_spheres(assembly)
+    bodies, table = assembly.solver.arrays.bodies, assembly.table
+    if bodies is None:
+        return spheres
+    alone = assembly.lone_grain[spheres.identity]
+    here = bodies.place.numpy()
+    alive = here[:, 3] > 0
+    parts = [getattr(spheres, name)[alone] for name in GrainCloud.__dataclass_fields__]
+    rows = [
+        assembly.grain_of_body[alive],
+        assembly.lattice.to_world(here[alive, :3]),
+        bodies.seen_velocity.numpy()[alive],
+        bodies.seen_spin.numpy()[alive],
+        assembly.body_extent[alive],
+        table.bodies.mass[alive],
+        bodies.turn.numpy()[alive],
+    ]
+    joined = [np.concatenate([part, row]) for part, row in zip(parts, rows, strict=True)]
+    order = np.argsort(joined[0], kind="stable")
+    return GrainCloud(*(column[order] for column in joined))
+
+
+def observe_bodies(assembly: Assembly, cloud: GrainCloud) -> tuple[BodyReport, ...]:
+    """Reports of the scene's free rigid bodies that are in the domain, read off the grains."""
+    reports, first = [], sum(assembly.fill_numbers)
+    for number, model in enumerate(assembly.bodies, first):
+        row = np.flatnonzero(cloud.identity == number)
+        if len(row):
+            position, orientation = model.own_frame(cloud.position[row[0]], cloud.orientation[row[0]])
+            velocity, spin = cloud.velocity[row[0]].astype(float), cloud.spin[row[0]].astype(float)
+            reports.append(BodyReport(model.body.name, position, orientation, velocity, spin, model.mass))
+    return tuple(reports)
 
 
 def observe_tools(
@@ -81,7 +126,7 @@ def observe_walls(assembly: Assembly) -> tuple[WallReport, ...]:
     return tuple(WallReport(one.name, -total) for one, total in zip(assembly.walls, totals, strict=True))
 
 
-def observe_health(assembly: Assembly, sums: Sums, start_energy: float, start_height: float) -> Health:
+def observe_health(assembly: Assembly, sums: Sums, start_energy: float, start_height: float, retired: int) -> Health:
     """Error indicators now.
 
     Args:
@@ -89,6 +134,7 @@ def observe_health(assembly: Assembly, sums: Sums, start_energy: float, start_he
         sums: of now.
         start_energy: kinetic, potential and elastic energy at time zero [J].
         start_height: potential energy at time zero [J].
+        retired: grains that have left the domain.
     """
     arrays, chosen = assembly.solver.arrays, assembly.time_step
     work = float(arrays.tools.work.numpy().sum()) if arrays.tools else 0.0
@@ -104,7 +150,7 @@ def observe_health(assembly: Assembly, sums: Sums, start_energy: float, start_he
         dissipated=start_energy + work - kinetic - sums.height - sums.elastic,
         fastest=sums.fastest,
         contacts=sums.touching,
-        retired=int(arrays.grains.retired.numpy()[0]),
+        retired=retired,
         doubts=(),
     )
     return find_doubts(health, chosen.speed)

@@ -48,3 +48,36 @@ def to_vector(q: np.ndarray) -> np.ndarray:
 def between(a: np.ndarray, b: np.ndarray, share: float) -> np.ndarray:
     """Rotation at a share (0 to 1) of the way from a to b, at constant angular velocity."""
     return multiply(from_vector(share * to_vector(multiply(b, inverse(a)))), a)
+
+
+def to_matrices(turns: np.ndarray) -> np.ndarray:
+    """Rotation matrices of unit quaternions, shape (..., 4) to (..., 3, 3)."""
+    x, y, z, w = np.moveaxis(np.asarray(turns, float), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def from_matrix(matrix: np.ndarray) -> np.ndarray:
+    """Unit quaternion of a rotation matrix, shape (4,)."""
+    # The symmetric matrix whose largest eigenvector is the quaternion is well conditioned for every rotation.
+    (a, b, c), (d, e, f), (g, h, i) = matrix
+    symmetric = np.array(
+        [
+            [a - e - i, b + d, c + g, h - f],
+            [b + d, e - a - i, f + h, c - g],
+            [c + g, f + h, i - a - e, d - b],
+            [h - f, c - g, d - b, a + e + i],
+        ]
+    )
+    q = np.linalg.eigh(symmetric)[1][:, -1]
+    return q if q[3] >= 0.0 else -q
+
+
+def at_random(number: int, random: np.random.Generator) -> np.ndarray:
+    """Evenly distributed unit quaternions, shape (number, 4)."""
+    q = random.normal(size=(number, 4))
+    return q / np.linalg.norm(q, axis=1)[:, None]

@@ -7,7 +7,7 @@ from sand_sim.assemble import Assembly, Progress, ToolModel, assemble
 from sand_sim.border import CommandError, Observation, ToolPose
 from sand_sim.engine.tools import ToolTrack
 from sand_sim.integrator import VERLET
-from sand_sim.observing import observe_grains, observe_health, observe_tools, observe_walls
+from sand_sim.observing import observe_bodies, observe_grains, observe_health, observe_spheres, observe_tools, observe_walls
 from sand_sim.scene.types import Scene
 from sand_sim.track import Track
 
@@ -36,6 +36,7 @@ class World:
         self._strike_off()
         self._solver.begin()
         sums = self._solver.measure()
+        self._grains_at_start = len(observe_grains(self.assembly))
         self._start_height = sums.height
         self._start_energy = sums.translation + sums.rotation + sums.height + sums.elastic
         tools = self._solver.arrays.tools
@@ -130,10 +131,13 @@ class World:
     def observe(self) -> Observation:
         """What the world shows now; forces on tools are means since the last observation."""
         steps, sums = self._solver.steps_done, self._solver.measure()
-        cloud = observe_grains(self.assembly)
+        spheres = observe_spheres(self.assembly)
+        cloud = observe_grains(self.assembly, spheres)
         reports = observe_tools(self.assembly, self._tracks, cloud, self.time, self._mean_wrenches(steps))
-        health = observe_health(self.assembly, sums, self._start_energy, self._start_height)
-        return Observation(self.time, steps, cloud, reports, observe_walls(self.assembly), health)
+        retired = self._grains_at_start - len(cloud)
+        health = observe_health(self.assembly, sums, self._start_energy, self._start_height, retired)
+        bodies = observe_bodies(self.assembly, cloud)
+        return Observation(self.time, steps, cloud, reports, observe_walls(self.assembly), health, bodies, spheres)
 
     def _mean_wrenches(self, steps: int) -> np.ndarray | None:
         """Mean wrenches on the tools since the last observation, those of now if no time has passed."""
@@ -209,5 +213,6 @@ class World:
             if fill.height is not None:
                 own = (cloud.identity >= first) & (cloud.identity < first + number)
                 above = cloud.position[:, 2] + cloud.radius > fill.low[2] + fill.height
-                self._solver.remove(cloud.identity[own & above])
+                gone = cloud.identity[own & above]
+                self._solver.remove(np.flatnonzero(np.isin(self.assembly.table.grain, gone)))
             first += number

@@ -29,8 +29,8 @@ ROS = {
 # Who may import whom among the parts of sand_sim; a part may always import itself.
 BELOW = {
     "contact": {"precision"},
-    "engine": {"contact", "precision", "integrator", "grain_table"},
-    "scene": {"contact", "precision", "integrator", "grain_table"},
+    "engine": {"contact", "precision", "integrator", "grain_table", "rotation"},
+    "scene": {"contact", "precision", "integrator", "grain_table", "rotation"},
 }
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import warp as wp
 
 from sand_sim.engine import energy, tool_contacts
+from sand_sim.engine.bodies import Bodies
 from sand_sim.engine.cells import prepare_cells
 from sand_sim.engine.contact_list import ContactList
 from sand_sim.engine.count import Count
@@ -76,6 +77,11 @@ class DemArrays:
         precision, number = recipe.precision, len(table)
         self.flags = Flags(device)
         self.grains = Grains(table, lattice, recipe, lanes, device)
+        self.bodies = Bodies(table, lattice, recipe, lanes, device) if recipe.bodies else None
+        self.felt_force = self.felt_torque = None
+        if self.bodies:
+            self.felt_force, self.felt_torque = (wp.zeros(number, dtype=precision.vec3, device=device) for _ in range(2))
+            self.body_energy = wp.zeros(1, dtype=wp.vec3d, device=device)
         self.kinds = len(pairs)
         rows = [pair for row in pairs for pair in row]
         self.pairs = wp.array(rows, dtype=recipe.contact.types(precision).pair, device=device)

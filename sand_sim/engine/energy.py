@@ -20,7 +20,7 @@ def blocks_for(items: int) -> int:
 @cache
 def build_grain_energy(recipe: Recipe) -> wp.Kernel:
     """Kernel for energies of grains: ``blocks`` holds translation, rotation and height [J], ``fastest`` the top speed [m/s]."""
-    precision, rotation = recipe.precision, recipe.rotation
+    precision, rotation, bodies = recipe.precision, recipe.rotation, recipe.bodies
     spin_type = precision.vec3 if recipe.integrator == VERLET else precision.vec4
     real, whole, vec3, vec4, whole4 = precision.real, precision.whole, precision.vec3, precision.vec4, precision.whole4
 
@@ -33,6 +33,7 @@ def build_grain_energy(recipe: Recipe) -> wp.Kernel:
         motion: wp.array(dtype=vec4),
         turning_now: wp.array(dtype=spin_type),
         spin: wp.array(dtype=vec4),
+        member: wp.array(dtype=int),
         gravity: vec3,
         quantum: real,
         blocks: wp.array(dtype=wp.vec3d),
@@ -46,6 +47,11 @@ def build_grain_energy(recipe: Recipe) -> wp.Kernel:
             first = block * wp.static(BLOCK)
             for i in range(first, wp.min(first + wp.static(BLOCK), grains)):
                 here = place[i]
+                part = int(-1)
+                if wp.static(bodies):
+                    part = member[i]
+                if part >= 0:
+                    continue
                 if here[3] > whole(0):
                     of_i = motion[i]
                     velocity = vec3(of_i[0], of_i[1], of_i[2])
@@ -65,6 +71,41 @@ def build_grain_energy(recipe: Recipe) -> wp.Kernel:
         fastest[lane] = wp.sqrt(top)
 
     return grain_energy
+
+
+@cache
+def build_body_energy(precision: Precision) -> wp.Kernel:
+    """Kernel for energies of rigid bodies: ``blocks`` holds translation, rotation and height [J]; one thread takes all."""
+    real, whole, vec3, vec4, whole4 = precision.real, precision.whole, precision.vec3, precision.vec4, precision.whole4
+
+    @kernel
+    def body_energy(
+        bodies: int,
+        place: wp.array(dtype=whole4),
+        motion: wp.array(dtype=vec4),
+        velocity: wp.array(dtype=wp.vec3d),
+        spin: wp.array(dtype=wp.vec3d),
+        turn: wp.array(dtype=wp.quatd),
+        inertia: wp.array(dtype=wp.vec3d),
+        gravity: vec3,
+        quantum: real,
+        blocks: wp.array(dtype=wp.vec3d),
+    ):
+        total = wp.vec3d(wp.float64(0.0))
+        for b in range(bodies):
+            here = place[b]
+            if here[3] > whole(0):
+                mass = wp.float64(motion[b][3])
+                omega = wp.quat_rotate_inv(turn[b], spin[b])
+                height = -wp.dot(gravity, vec3(real(here[0]), real(here[1]), real(here[2])) * quantum)
+                total += wp.vec3d(
+                    wp.float64(0.5) * mass * wp.dot(velocity[b], velocity[b]),
+                    wp.float64(0.5) * wp.dot(wp.cw_mul(inertia[b], omega), omega),
+                    mass * wp.float64(height),
+                )
+        blocks[0] = total
+
+    return body_energy
 
 
 @cache

@@ -7,7 +7,8 @@ import numpy as np
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.energy import blocks_for
 from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_ROOM
-from sand_sim.engine.stages import choose_stages, record_measurement, record_renewal, record_run
+from sand_sim.engine.measuring import record_measurement
+from sand_sim.engine.stages import choose_stages, record_renewal, record_run
 from sand_sim.engine.state import put_state, take_state
 
 
@@ -79,7 +80,6 @@ class ExplicitDem:
         self.renew_lists()
         arrays.flags.steps_done.zero_()
         arrays.deepest.zero_()
-        arrays.grains.retired.zero_()
         if arrays.tools:
             for sum_so_far in (arrays.tools.wrench, arrays.tools.impulse, arrays.tools.work):
                 sum_so_far.zero_()
@@ -91,13 +91,18 @@ class ExplicitDem:
             self._play(record_renewal)
 
     def remove(self, identities: np.ndarray) -> None:
-        """Retire grains by their identities, shape (n,)."""
+        """Retire spheres by their identities, shape (n,); of a rigid body all must be given."""
         grains = self.arrays.grains
         active = grains.active.get()
         place = grains.place.numpy().copy()
         gone = np.flatnonzero(np.isin(grains.identity.numpy()[:active], identities))
         place[gone] = [self.arrays.lattice.end] * 3 + [0]
         grains.place.assign(place)
+        if self.arrays.bodies:
+            bodies, members = self.arrays.bodies, grains.member.numpy()[gone]
+            alive = bodies.place.numpy().copy()
+            alive[bodies.body_of.numpy()[members[members >= 0]], 3] = 0
+            bodies.place.assign(alive)
         self.expect_moves()
 
     def measure(self) -> Sums:
@@ -106,7 +111,10 @@ class ExplicitDem:
         self.renew_lists()
         self._program(record_measurement)()
         grains = arrays.grain_blocks.numpy()[: blocks_for(arrays.grains.active.get())]
-        translation, rotation, height = grains.sum(axis=0)
+        energies = grains.sum(axis=0)
+        if arrays.bodies:
+            energies = energies + arrays.body_energy.numpy()[0]
+        translation, rotation, height = energies
         contacts = np.zeros(2)
         for name, listed in arrays.lists.items():
             contacts += arrays.energy_blocks[name].numpy()[: blocks_for(listed.pairs.get())].sum(axis=0)

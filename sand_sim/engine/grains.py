@@ -20,11 +20,11 @@ class Grains:
         motion: velocity [m/s] and, last, mass [kg], vec4, shape (n,).
         spin: angular velocity [rad/s] and, last, moment of inertia [kg m^2], vec4, shape (n,); None without rotation.
         half_motion, half_spin: velocities half a step ago, vec3, shape (n,) [m/s], [rad/s]; None unless the integrator asks.
+        member: which member of the rigid bodies a sphere is, -1 for none, shape (n,), int; None without bodies.
         material: shape (n,), int; None if all grains are of one material.
-        identity: number of the grain in the scene's table, shape (n,), int.
+        identity: row of the sphere in the scene's table, shape (n,), int.
         came_from: its number when the contact lists were made, shape (n,), int.
         origin: place when the contact lists were made, whole4, shape (n,).
-        retired: grains that have left the domain so far, int, shape (1,).
     """
 
     def __init__(self, table: GrainTable, lattice: Lattice, recipe: Recipe, lanes: int, device: str):
@@ -38,18 +38,18 @@ class Grains:
         halves, vec3 = recipe.integrator == VERLET, precision.vec3
         self.half_motion = wp.zeros(number, dtype=vec3, device=device) if halves else None
         self.half_spin = wp.zeros(number, dtype=vec3, device=device) if halves and recipe.rotation else None
+        self.member = wp.zeros(number, dtype=int, device=device) if recipe.bodies else None
         self.material = wp.zeros(number, dtype=int, device=device) if recipe.materials else None
         self.identity = wp.zeros(number, dtype=int, device=device)
         self.came_from = wp.zeros(number, dtype=int, device=device)
         self.origin = wp.zeros(number, dtype=precision.whole4, device=device)
-        self.retired = wp.zeros(1, dtype=int, device=device)
         self.load(table)
 
     @property
     def sorted_arrays(self) -> list[wp.array]:
         """All arrays that are renumbered together."""
         arrays = [self.place, self.remainder, self.motion, self.spin, self.half_motion, self.half_spin]
-        arrays += [self.material, self.identity, self.came_from]
+        arrays += [self.member, self.material, self.identity, self.came_from]
         return [array for array in arrays if array is not None]
 
     def load(self, table: GrainTable) -> None:
@@ -68,9 +68,10 @@ class Grains:
             self.half_motion.assign(table.velocity.astype(precision.numpy_real))
         if self.half_spin is not None:
             self.half_spin.assign(table.spin.astype(precision.numpy_real))
+        if self.member is not None:
+            self.member.assign(np.where(table.lone, -1, np.cumsum(~table.lone) - 1))
         if self.material is not None:
             self.material.assign(table.material)
         self.identity.assign(np.arange(number))
         self.came_from.assign(np.arange(number))
         self.active.set(number)
-        self.retired.zero_()

@@ -98,12 +98,13 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
     predicted for the end of the step, which damping and friction see: second order with both. The first step takes
     ``w += a dt/2``.
 
-    Grains that leave the domain get radius zero and are parked; the next search retires them.
+    What spheres of rigid bodies feel is put aside for ``body_motion``. Grains that leave the domain get radius zero and are
+    parked; the next search retires them.
 
     Source: Swope et al. 1982, https://doi.org/10.1063/1.442716; prediction as Groot & Warren 1997,
     https://doi.org/10.1063/1.474784, with lambda = 1/2 for the half-step velocity.
     """
-    precision, rotation = recipe.precision, recipe.rotation
+    precision, rotation, bodies = recipe.precision, recipe.rotation, recipe.bodies
     verlet = recipe.integrator == VERLET
     real, whole, vec3, vec4, whole3, whole4 = (
         precision.real,
@@ -141,6 +142,9 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
         tool_force: wp.array(dtype=vec3),
         tool_couple: wp.array(dtype=vec4),
         tool_moment: wp.array(dtype=vec3),
+        member: wp.array(dtype=int),
+        felt_force: wp.array(dtype=vec3),
+        felt_torque: wp.array(dtype=vec3),
         gravity: vec3,
         dt: real,
         quantum: real,
@@ -174,6 +178,13 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
                 tool_couple,
                 tool_moment,
             )
+            part = int(-1)
+            if wp.static(bodies):
+                part = member[i]
+            if part >= 0:
+                felt_force[i] = total
+                felt_torque[i] = torque
+                continue
             old = motion[i]
             gain = (total / old[3] + gravity) * dt
             velocity = vec3(old[0], old[1], old[2]) + gain
@@ -232,7 +243,7 @@ def build_complete_step(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
 
     Nobody steps on with what it writes, so looking changes nothing.
     """
-    precision, rotation = recipe.precision, recipe.rotation
+    precision, rotation, bodies = recipe.precision, recipe.rotation, recipe.bodies
     real, whole, vec3, vec4, whole4 = precision.real, precision.whole, precision.vec3, precision.vec4, precision.whole4
     gather = build_gather(recipe, walls, tools)
 
@@ -260,6 +271,9 @@ def build_complete_step(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
         tool_force: wp.array(dtype=vec3),
         tool_couple: wp.array(dtype=vec4),
         tool_moment: wp.array(dtype=vec3),
+        member: wp.array(dtype=int),
+        felt_force: wp.array(dtype=vec3),
+        felt_torque: wp.array(dtype=vec3),
         gravity: vec3,
         dt: real,
         quantum: real,
@@ -293,6 +307,13 @@ def build_complete_step(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
                     tool_couple,
                     tool_moment,
                 )
+                part = int(-1)
+                if wp.static(bodies):
+                    part = member[i]
+                if part >= 0:
+                    felt_force[i] = total
+                    felt_torque[i] = torque
+                    continue
                 velocity = half_motion[i] + (total / seen[3] + gravity) * (real(0.5) * dt)
                 seen = vec4(velocity[0], velocity[1], velocity[2], seen[3])
                 if wp.static(rotation):

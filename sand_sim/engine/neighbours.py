@@ -13,6 +13,18 @@ from sand_sim.engine.kernel import kernel
 from sand_sim.engine.recipe import Recipe
 
 
+@wp.func
+def of_one_body(member: wp.array(dtype=int), body_of: wp.array(dtype=int), i: int, j: int) -> bool:
+    """Whether two spheres belong to the same rigid body."""
+    of_i = int(-1)
+    if member[i] >= 0:
+        of_i = body_of[member[i]]
+    of_j = int(-2)
+    if member[j] >= 0:
+        of_j = body_of[member[j]]
+    return of_i == of_j
+
+
 @cache
 def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
     """Kernel that visits each pair of spheres closer than touch plus skin, once, from the sphere that comes first.
@@ -20,7 +32,7 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
     Spheres are numbered in the order of their cells, level by level from fine to coarse. A sphere looks at what follows in its
     own level and at all cells around it in coarser levels. The first pass counts, the second (``filling``) writes the list.
     """
-    precision, history = recipe.precision, recipe.history
+    precision, history, bodies = recipe.precision, recipe.history, recipe.bodies
     real, whole3, whole4 = precision.real, precision.whole3, precision.whole4
     memory_vector, swapped = memory_type(recipe.contact, precision), build_swapped(recipe)
     level = level_type(precision)
@@ -36,6 +48,8 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         lowest: wp.array(dtype=whole3),
         cell_starts: wp.array(dtype=int),
         skin: real,
+        member: wp.array(dtype=int),
+        body_of: wp.array(dtype=int),
         counts: wp.array(dtype=int),
         starts: wp.array(dtype=int),
         owner: wp.array(dtype=int),
@@ -75,6 +89,11 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                         dz = real(here[2] - there[2])
                         reach = real(here[3] + there[3]) + skin
                         if dx * dx + dy * dy + dz * dz < reach * reach:
+                            apart = bool(True)
+                            if wp.static(bodies):
+                                apart = not of_one_body(member, body_of, i, j)
+                            if not apart:
+                                continue
                             if wp.static(filling):
                                 owner[found] = i
                                 partner[found] = j
@@ -127,12 +146,9 @@ def build_put_back(dtype: type) -> wp.Kernel:
 
 
 @kernel
-def count_active(
-    cell_starts: wp.array(dtype=int), bins: wp.array(dtype=int), spans: wp.array(dtype=int), retired: wp.array(dtype=int)
-):
+def count_active(cell_starts: wp.array(dtype=int), bins: wp.array(dtype=int), spans: wp.array(dtype=int)):
     """Grains sorted behind the last cell have retired."""
     active = cell_starts[bins[0] - 1]
-    retired[0] = retired[0] + spans[spans.shape[0] - 1] - active
     share_out(spans, active)
 
 

@@ -15,18 +15,20 @@ class Recipe:
         contact: one law per slot.
         precision: number types.
         materials: grains are of more than one material.
+        bodies: some grains are rigid bodies of several spheres.
         integrator: one of ``integrator.INTEGRATORS``.
     """
 
     contact: ContactModel = field(default_factory=ContactModel)
     precision: Precision = SINGLE
     materials: bool = False
+    bodies: bool = False
     integrator: str = VERLET
 
     @property
     def rotation(self) -> bool:
         """Whether grains turn."""
-        return self.contact.rotation
+        return self.bodies or self.contact.rotation
 
     @property
     def history(self) -> bool:

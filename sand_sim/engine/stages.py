@@ -6,12 +6,11 @@ from functools import partial
 
 import warp as wp
 
-from sand_sim.engine import energy, finish, motion, neighbours, pair_forces, surfaces, tool_contacts
+from sand_sim.engine import body_motion, finish, motion, neighbours, pair_forces, surfaces, tool_contacts
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_lay_cells
 from sand_sim.engine.contact_list import ContactList, record_count, record_fill
 from sand_sim.engine.sorting import record_sort
-from sand_sim.integrator import VERLET
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,10 @@ def choose_stages(arrays: DemArrays) -> Stages:
         step.append(Stage("wall forces", wall_stage))
     if arrays.tools:
         step.append(Stage("tool forces", tool_stage))
-    step += [Stage("move grains", move_stage), Stage("finish step", finish_stage)]
+    step.append(Stage("move grains", move_stage))
+    if arrays.bodies:
+        step.append(Stage("move bodies", body_stage))
+    step += [Stage("finish step", finish_stage)]
     return Stages(
         listing=(Stage("sort grains", sort_stage), Stage("list contacts", list_stage)),
         tool_listing=(Stage("list tool contacts", tool_list_stage),) if arrays.tools else (),
@@ -83,29 +85,6 @@ def record_renewal(arrays: DemArrays, stages: Stages, recorder) -> None:
     record_lists(arrays, stages, recorder)
 
 
-def record_measurement(arrays: DemArrays, stages: Stages, recorder) -> None:
-    """Record what an observer wants: forces and velocities of now, energies, top speed, touching contacts."""
-    grains, setting, recipe = arrays.grains, arrays.setting, arrays.recipe
-    gravity = recipe.precision.vec3(*setting.gravity)
-    pair_stage(arrays, recorder, measuring=True)
-    if arrays.walls:
-        wall_stage(arrays, recorder, measuring=True)
-    if arrays.tools:
-        tool_stage(arrays, recorder, measuring=True)
-        recorder.once(finish.sum_wrenches, [arrays.tool_list.pairs.spans, arrays.wrench_blocks, arrays.tools.wrench])
-    if recipe.integrator == VERLET:
-        inputs = [grains.place, grains.motion, grains.spin, grains.half_motion, grains.half_spin, *_gathered(arrays)]
-        inputs += [gravity, setting.dt, arrays.lattice.quantum, arrays.flags.starting, arrays.seen_motion, arrays.seen_spin]
-        complete = motion.build_complete_step(recipe, bool(arrays.walls), bool(arrays.tools))
-        recorder.each(complete, grains.active, inputs)
-    inputs = [grains.active.spans, grains.place, arrays.seen_motion, arrays.seen_spin, grains.spin]
-    inputs += [gravity, arrays.lattice.quantum, arrays.grain_blocks, arrays.fastest]
-    recorder.share(energy.build_grain_energy(recipe), inputs)
-    for name, contacts in arrays.lists.items():
-        inputs = [contacts.pairs.spans, arrays.energy[name], arrays.energy_blocks[name]]
-        recorder.share(energy.build_contact_energy(arrays.recipe.precision), inputs)
-
-
 def sort_stage(arrays: DemArrays, recorder) -> None:
     """Renumber the grains in the order of their cells; those that have left fall off the end."""
     grains, cells, precision = arrays.grains, arrays.cells, arrays.recipe.precision
@@ -118,7 +97,9 @@ def sort_stage(arrays: DemArrays, recorder) -> None:
         spare = arrays.spare[array.dtype]
         recorder.each(neighbours.build_take_in_order(array.dtype), active, [arrays.in_cells.order, array, spare])
         recorder.each(neighbours.build_put_back(array.dtype), active, [spare, array])
-    recorder.once(neighbours.count_active, [arrays.in_cells.starts, cells.bins, active.spans, grains.retired])
+    recorder.once(neighbours.count_active, [arrays.in_cells.starts, cells.bins, active.spans])
+    if arrays.bodies:
+        recorder.each(body_motion.find_members, active, [grains.member, arrays.bodies.sphere_at])
 
 
 def list_stage(arrays: DemArrays, recorder) -> None:
@@ -128,6 +109,7 @@ def list_stage(arrays: DemArrays, recorder) -> None:
 
     def pairs(filling):
         inputs = [grains.place, cells.levels, cells.low, arrays.in_cells.starts, gap / quantum]
+        inputs += [grains.member, arrays.bodies.body_of if arrays.bodies else None]
         inputs += _list_arguments(arrays, arrays.pair_list)
         recorder.each(neighbours.build_search(arrays.recipe, filling), active, inputs)
 
@@ -212,7 +194,10 @@ def move_stage(arrays: DemArrays, recorder) -> None:
             grains.half_motion,
             grains.half_spin,
             grains.origin,
-            *_gathered(arrays),
+            *gathered(arrays),
+            grains.member,
+            arrays.felt_force,
+            arrays.felt_torque,
             precision.vec3(*setting.gravity),
             setting.dt,
             lattice.quantum,
@@ -224,6 +209,19 @@ def move_stage(arrays: DemArrays, recorder) -> None:
             arrays.flags.fault,
         ],
     )
+
+
+def body_stage(arrays: DemArrays, recorder) -> None:
+    """Advance all rigid bodies and their spheres."""
+    grains, bodies, lattice, setting = arrays.grains, arrays.bodies, arrays.lattice, arrays.setting
+    precision, flags = arrays.recipe.precision, arrays.flags
+    inputs = [bodies.starts, bodies.sphere_at, bodies.offset, bodies.place, bodies.remainder, bodies.motion]
+    inputs += [bodies.half_motion, bodies.turn, bodies.momentum, bodies.inertia]
+    inputs += [grains.place, grains.motion, grains.spin, grains.origin, arrays.felt_force, arrays.felt_torque]
+    inputs += [precision.vec3(*setting.gravity), setting.dt, lattice.quantum]
+    inputs += [precision.whole3(*lattice.half_extent.tolist()), lattice.end, 0.5 * setting.skin / lattice.quantum]
+    inputs += [flags.starting, flags.grains_moved, flags.fault]
+    recorder.each(body_motion.build_move_bodies(arrays.recipe), bodies.count, inputs)
 
 
 def finish_stage(arrays: DemArrays, recorder) -> None:
@@ -291,7 +289,7 @@ def _act_arguments(arrays: DemArrays, name: str) -> list:
     return [contacts.memory, contacts.force, contacts.couple, contacts.moment, arrays.deepest, arrays.energy[name]]
 
 
-def _gathered(arrays: DemArrays) -> list:
+def gathered(arrays: DemArrays) -> list:
     """What a grain sums over: its contacts in all lists."""
     parts = {name: [None] * 4 for name in ("pair", "wall", "tool")}
     parts |= {name: [one.starts, one.force, one.couple, one.moment] for name, one in arrays.lists.items()}

@@ -61,16 +61,19 @@ def _whole_arrays(arrays: DemArrays) -> dict[str, wp.array]:
         "spin",
         "half_motion",
         "half_spin",
+        "member",
         "material",
         "identity",
         "came_from",
         "origin",
-        "retired",
     )
     found = {f"grains.{name}": getattr(grains, name) for name in names}
     found |= {f"flags.{name}": getattr(flags, name) for name in ("grains_moved", "tools_moved", "starting", "steps_done")}
     found |= {f"{name}.starts": contacts.starts for name, contacts in arrays.lists.items()}
     found["met.starts"] = arrays.met.starts
+    if arrays.bodies:
+        names = ("sphere_at", "place", "remainder", "motion", "half_motion", "turn", "momentum")
+        found |= {f"bodies.{name}": getattr(arrays.bodies, name) for name in names}
     if tools:
         names = ("tracks", "states", "travelled", "wrench", "impulse", "work")
         found |= {f"tools.{name}": getattr(tools, name) for name in names}

@@ -129,7 +129,7 @@ class SandSimNode(Node):
         if rate > 0.0 and observation.time >= self._next_points - 1e-9:
             self._next_points = max(self._next_points + 1.0 / rate, observation.time)
             decimation = self.get_parameter("points_decimation").value
-            cloud = grains_to_cloud(observation.grains, observation.time, self._settings["frame_id"], decimation)
+            cloud = grains_to_cloud(observation.spheres, observation.time, self._settings["frame_id"], decimation)
             self._points.publish(cloud)
         self.recorder.write(observation)
         if time.monotonic() - self._told > _PROGRESS_PERIOD:

@@ -14,12 +14,13 @@ def check_scene(scene: Scene) -> None:
     """
     if not scene.materials:
         raise SceneError("materials: at least one material is needed")
-    if not scene.fills:
-        raise SceneError("fills: at least one fill is needed, there is nothing to simulate without grains")
+    if not (scene.fills or scene.bodies):
+        raise SceneError("fills: at least one fill, or one of 'bodies', is needed; there is nothing to simulate otherwise")
     known = {m.name for m in scene.materials}
     used = [("fills", f.name, f.material) for f in scene.fills]
     used += [("boundaries", b.name, b.material) for b in scene.boundaries]
     used += [("tools", t.name, t.material) for t in scene.tools]
+    used += [("bodies", b.name, b.material) for b in scene.bodies]
     for section, name, material in used:
         if material not in known:
             raise SceneError(f"{section}: '{name}' is of unknown material '{material}'; known are {', '.join(sorted(known))}")
@@ -48,7 +49,7 @@ def _check_pairs(scene: Scene, known: set[str]) -> None:
         if set(rule.between) in given:
             raise SceneError(f"pairs: {' and '.join(rule.between)} are given twice")
         given.append(set(rule.between))
-    grains = sorted({f.material for f in scene.fills})
+    grains = sorted({one.material for one in (*scene.fills, *scene.bodies)})
     others = {b.material for b in scene.boundaries} | {t.material for t in scene.tools}
     needed = list(combinations_with_replacement(grains, 2)) + [(g, o) for g in grains for o in sorted(others)]
     for a, b in needed:

@@ -5,7 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from sand_sim import rotation
 from sand_sim.grain_table import GrainTable
+from sand_sim.scene.clumps import place_clumps
+from sand_sim.scene.shapes import Shape, shape_named
 from sand_sim.scene.types import Fill, Material, SceneError, SizeDistribution
 from sand_sim.scene.walls import Wall
 
@@ -26,10 +29,11 @@ def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -
     Raises:
         SceneError: if the region cannot hold them, or the file is unreadable.
     """
+    shape = shape_named(fill.shape, f"fills: '{fill.name}'")
     if fill.file is not None:
-        return _read_positions(fill, material, index)
+        return _read_positions(fill, shape, material, index)
     random = np.random.default_rng(fill.seed)
-    largest = _largest(fill.size)
+    largest = _largest(fill.size) * (shape.bounding_radius / shape.equal_radius if shape else 1.0)
     points = _lattice(np.asarray(fill.low, float), np.asarray(fill.high, float), largest, random)
     for wall in walls:
         points = points[wall.distance(points) > largest]
@@ -39,7 +43,9 @@ def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -
             f"fills: '{fill.name}' has room for {len(points)} loosely packed grains but {wanted} are wanted; "
             "enlarge 'region' or ask for fewer grains"
         )
-    return _table(points[:wanted], _draw(fill.size, wanted, random), fill, material, index)
+    radius = _draw(fill.size, wanted, random)
+    turns = rotation.at_random(wanted, random) if shape else None
+    return _table(points[:wanted], radius, fill, material, index, shape, turns)
 
 
 def _largest(size: SizeDistribution) -> float:
@@ -93,20 +99,22 @@ def _count_for_height(fill: Fill, walls: list[Wall], random: np.random.Generator
     return max(1, round(_POURED_FRACTION * volume / grain))
 
 
-def _table(position: np.ndarray, radius: np.ndarray, fill: Fill, material: Material, index: int) -> GrainTable:
+def _table(position, radius, fill: Fill, material: Material, index: int, shape: Shape | None, turns, spin=None, velocity=None):
     number = len(radius)
-    return GrainTable(
-        position=position,
-        velocity=np.tile(np.asarray(fill.velocity, float), (number, 1)),
-        spin=np.zeros((number, 3)),
-        radius=radius,
-        density=np.full(number, material.density),
-        material=np.full(number, index),
-    )
+    velocity = np.tile(np.asarray(fill.velocity, float), (number, 1)) if velocity is None else velocity
+    spin = np.zeros((number, 3)) if spin is None else spin
+    if shape:
+        return place_clumps(shape, position, turns, radius, velocity, spin, material.density, index)
+    density, kind = np.full(number, material.density), np.full(number, index)
+    return GrainTable.of_spheres(position, velocity, spin, radius, density, kind)
 
 
-def _read_positions(fill: Fill, material: Material, index: int) -> GrainTable:
-    """Grains from an npz (position, radius, optionally velocity, spin) or csv file (x, y, z, radius, vx, vy, vz, wx, wy, wz)."""
+def _read_positions(fill: Fill, shape: Shape | None, material: Material, index: int) -> GrainTable:
+    """Grains from a file.
+
+    From npz: position, radius, optionally velocity, spin, orientation; from csv: x, y, z, radius, vx, vy, vz, wx, wy, wz, and
+    qx, qy, qz, qw.
+    """
     path = Path(fill.file)
     where = f"fills: file '{path.name}' of '{fill.name}'"
     try:
@@ -124,19 +132,22 @@ def _read_positions(fill: Fill, material: Material, index: int) -> GrainTable:
     number = len(position)
     if radius.shape != (number,):
         raise SceneError(f"{where}: 'radius' must have shape ({number},), got {radius.shape}")
-    table = _table(position, radius, fill, material, index)
-    for name in ("velocity", "spin"):
+    given = {}
+    for name, width in (("velocity", 3), ("spin", 3), ("orientation", 4)):
         if name in columns:
-            values = np.asarray(columns[name], float)
-            if values.shape != (number, 3):
-                raise SceneError(f"{where}: '{name}' must have shape ({number}, 3), got {values.shape}")
-            getattr(table, name)[:] = values
-    for name in ("position", "radius", "velocity", "spin"):
-        if not np.all(np.isfinite(getattr(table, name))):
+            given[name] = np.asarray(columns[name], float)
+            if given[name].shape != (number, width):
+                raise SceneError(f"{where}: '{name}' must have shape ({number}, {width}), got {given[name].shape}")
+    for name, values in (("position", position), ("radius", radius), *given.items()):
+        if not np.all(np.isfinite(values)):
             raise SceneError(f"{where}: '{name}' has values that are not finite")
     if np.any(radius <= 0.0):
         raise SceneError(f"{where}: 'radius' must be positive [m], the smallest is {radius.min():g}")
-    return table
+    turns = given.pop("orientation", np.tile([0.0, 0.0, 0.0, 1.0], (number, 1)))
+    lengths = np.linalg.norm(turns, axis=1)
+    if np.any(lengths < 1e-6):
+        raise SceneError(f"{where}: 'orientation' must not be the zero quaternion; 0, 0, 0, 1 is no rotation")
+    return _table(position, radius, fill, material, index, shape, turns / lengths[:, None], **given)
 
 
 def _read_csv(path: Path) -> dict[str, np.ndarray]:
@@ -150,7 +161,12 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
         return np.column_stack([[float(row[names[name]]) for row in rows] for name in wanted])
 
     columns = {}
-    for key, wanted in (("position", ("x", "y", "z")), ("velocity", ("vx", "vy", "vz")), ("spin", ("wx", "wy", "wz"))):
+    for key, wanted in (
+        ("position", ("x", "y", "z")),
+        ("velocity", ("vx", "vy", "vz")),
+        ("spin", ("wx", "wy", "wz")),
+        ("orientation", ("qx", "qy", "qz", "qw")),
+    ):
         if all(name in names for name in wanted):
             columns[key] = column(*wanted)
     if "radius" in names:

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import yaml
 
 from sand_sim.contact.law import ASKS
@@ -11,6 +10,9 @@ from sand_sim.integrator import INTEGRATORS, VERLET
 from sand_sim.precision import PRECISIONS
 from sand_sim.scene.checking import check_scene
 from sand_sim.scene.fields import Field
+from sand_sim.scene.reading_bodies import read_body
+from sand_sim.scene.reading_poses import read_pose
+from sand_sim.scene.shapes import SPHERE, TETRAHEDRON
 from sand_sim.scene.types import (
     Boundary,
     Fill,
@@ -72,6 +74,7 @@ def read_scene(parsed: dict, folder: Path) -> Scene:
             "fills",
             "boundaries",
             "tools",
+            "bodies",
             "contact",
             "liquid",
             "solver",
@@ -79,7 +82,7 @@ def read_scene(parsed: dict, folder: Path) -> Scene:
             "duration",
             "frame_rate",
         ),
-        required=("materials", "pairs", "fills"),
+        required=("materials", "pairs"),
     )
     scene = Scene(
         name=top.optional("name", Field.text, "scene"),
@@ -87,9 +90,10 @@ def read_scene(parsed: dict, folder: Path) -> Scene:
         domain=top.optional("domain", _corners, None),
         materials=tuple(_material(name, entry) for name, entry in top["materials"].items()),
         pairs=tuple(_pair(entry) for entry in top["pairs"].entries()),
-        fills=tuple(_fill(entry, folder) for entry in top["fills"].entries()),
+        fills=tuple(_fill(entry, folder) for entry in top["fills"].entries()) if "fills" in top else (),
         boundaries=tuple(_boundary(entry) for entry in top["boundaries"].entries()) if "boundaries" in top else (),
         tools=tuple(_tool(name, entry) for name, entry in top["tools"].items()) if "tools" in top else (),
+        bodies=tuple(read_body(name, entry, folder) for name, entry in top["bodies"].items()) if "bodies" in top else (),
         contact=top.optional("contact", _contact, ContactModel()),
         liquid=top.optional("liquid", _liquid, None),
         solver=top.optional("solver", _solver, Solver()),
@@ -161,7 +165,9 @@ def _size(entry: Field) -> SizeDistribution:
 
 
 def _fill(entry: Field, folder: Path) -> Fill:
-    entry.keys(("name", "material", "radius", "region", "count", "height", "file", "velocity", "seed"), required=("material",))
+    entry.keys(
+        ("name", "material", "shape", "radius", "region", "count", "height", "file", "velocity", "seed"), required=("material",)
+    )
     ways = [way for way in ("count", "height", "file") if way in entry]
     if len(ways) != 1:
         raise entry.refuse("give exactly one of 'count', 'height' and 'file'")
@@ -171,6 +177,7 @@ def _fill(entry: Field, folder: Path) -> Fill:
     return Fill(
         name=entry.optional("name", Field.text, entry.path),
         material=entry["material"].text(),
+        shape=entry.optional("shape", lambda f: f.text() if f.value in (SPHERE, TETRAHEDRON) else folder / f.text(), SPHERE),
         size=entry.optional("radius", _size, None),
         low=low,
         high=high,
@@ -200,31 +207,6 @@ def _boundary(entry: Field) -> Boundary:
     return Boundary(**common, low=low, high=high, open_sides=sides)
 
 
-def _pose(entry: Field) -> Pose:
-    entry.keys(("position", "orientation", "rpy"))
-    position = entry.optional("position", Field.vector, (0.0, 0.0, 0.0))
-    if "rpy" in entry:
-        return Pose(position, _quaternion_of_rpy(*entry["rpy"].vector()))
-    if "orientation" not in entry:
-        return Pose(position)
-    quaternion = np.array(entry["orientation"].vector(4))
-    length = np.linalg.norm(quaternion)
-    if length < 1e-6:
-        raise entry["orientation"].refuse("must not be the zero quaternion; [0, 0, 0, 1] is no rotation")
-    return Pose(position, tuple(quaternion / length))
-
-
-def _quaternion_of_rpy(roll: float, pitch: float, yaw: float) -> tuple:
-    """Fixed-axis roll, pitch, yaw [rad] (REP-103) to a quaternion x y z w."""
-    cr, sr, cp, sp, cy, sy = (f(a / 2.0) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
-    return (
-        float(sr * cp * cy - cr * sp * sy),
-        float(cr * sp * cy + sr * cp * sy),
-        float(cr * cp * sy - sr * sp * cy),
-        float(cr * cp * cy + sr * sp * sy),
-    )
-
-
 def _tool(name: str, entry: Field) -> Tool:
     entry.keys(
         ("mesh", "material", "particle_radius", "scale", "pose", "max_speed", "trajectory"),
@@ -239,7 +221,7 @@ def _tool(name: str, entry: Field) -> Tool:
         if track and time <= track[-1].time:
             raise stop["time"].refuse(f"must be later than the waypoint before, at {track[-1].time:g} s")
         pose = {key: stop.value[key] for key in ("position", "orientation", "rpy") if key in stop.value}
-        track.append(Waypoint(time, _pose(Field(pose, stop.path)), stop.optional("phase", Field.text, "")))
+        track.append(Waypoint(time, read_pose(Field(pose, stop.path)), stop.optional("phase", Field.text, "")))
     initial = track[0].pose if track and "pose" not in entry else Pose()
     return Tool(
         name,
@@ -247,7 +229,7 @@ def _tool(name: str, entry: Field) -> Tool:
         material=entry["material"].text(),
         particle_radius=entry["particle_radius"].number(above=0.0, unit="m"),
         scale=entry.optional("scale", lambda f: f.number(above=0.0), 1.0),
-        pose=entry.optional("pose", _pose, initial),
+        pose=entry.optional("pose", read_pose, initial),
         max_speed=entry.optional("max_speed", lambda f: f.number(above=0.0, unit="m/s"), 2.0),
         trajectory=tuple(track),
     )

@@ -55,11 +55,13 @@ class SizeDistribution:
 class Fill:
     """Grains put into a box-shaped region, or read from a file.
 
-    By ``count``, by ``height`` (of the bed above the region's floor once it has settled), or from ``file``.
+    By ``count``, by ``height`` (of the bed above the region's floor once it has settled), or from ``file``. The ``shape`` is
+    ``sphere``, ``tetrahedron`` (four spheres) or the path of a clump file; sizes are those of spheres of the same volume.
     """
 
     name: str
     material: str
+    shape: str | Path = "sphere"
     size: SizeDistribution | None = None
     low: Vector | None = None  # [m]
     high: Vector | None = None  # [m]
@@ -100,6 +102,27 @@ class Waypoint:
     time: float
     pose: Pose
     phase: str = ""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A free rigid body: from a mesh, a clump file or a list of spheres, all given in the body's own frame.
+
+    Mass and inertia are those of the solid at the material's density unless given; a given inertia is about the axes of the
+    body's own frame, which then must be principal.
+    """
+
+    name: str
+    material: str
+    mesh: str | None = None
+    particle_radius: float = 0.0  # [m] of the particles that make the mesh's skin
+    scale: float = 1.0
+    spheres: Path | tuple[tuple[float, ...], ...] | None = None  # x y z radius [m]
+    pose: Pose = field(default_factory=Pose)
+    velocity: Vector = (0.0, 0.0, 0.0)  # [m/s] of the centre of mass
+    spin: Vector = (0.0, 0.0, 0.0)  # [rad/s] world frame
+    mass: float | None = None  # [kg]
+    inertia: Vector | None = None  # [kg m^2] principal moments
 
 
 @dataclass(frozen=True)
@@ -155,6 +178,7 @@ class Scene:
     fills: tuple[Fill, ...]
     boundaries: tuple[Boundary, ...] = ()
     tools: tuple[Tool, ...] = ()
+    bodies: tuple[Body, ...] = ()
     gravity: Vector = (0.0, 0.0, -9.81)  # [m/s^2]
     domain: tuple[Vector, Vector] | None = None  # [m] corners; grains that leave it are retired
     contact: ContactModel = field(default_factory=ContactModel)

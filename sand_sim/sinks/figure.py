@@ -85,7 +85,7 @@ def _draw_view(axis, observation: Observation, tools: list[ToolModel]) -> None:
     from matplotlib.collections import EllipseCollection, PolyCollection
 
     cut = observation.tools[0].position[1] if observation.tools else -np.inf
-    grains: GrainCloud = observation.grains
+    grains: GrainCloud = observation.spheres
     shown = np.flatnonzero(grains.position[:, 1] > cut - grains.radius)
     spots, depth = _project(grains.position[shown])
     colours = colour_by_speed(grains.speed[shown], 1.0) / 255.0

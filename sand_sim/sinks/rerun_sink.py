@@ -46,7 +46,7 @@ class RerunSink:
 
     def write(self, observation: Observation) -> None:
         """Add one observation."""
-        recording, grains, health = self._recording, observation.grains, observation.health
+        recording, grains, health = self._recording, observation.spheres, observation.health
         recording.set_time(_TIMELINE, duration=observation.time)
         recording.log(
             "world/grains",

@@ -113,7 +113,7 @@ def test_laws_make_a_difference(make_world):
     ends = []
     for choice in CHOICES:
         _, reference = make_both(make_world, 12, choice, "double", "velocity_verlet")
-        for _ in range(600):
+        for _ in range(300):
             reference.step()
         ends.append(np.concatenate([reference.x, reference.w * 1e-3]))
     differences = [np.abs(a - b).max() for k, a in enumerate(ends) for b in ends[:k]]

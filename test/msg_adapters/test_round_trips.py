@@ -67,6 +67,7 @@ def grains(number):
         spin=np.zeros((number, 3), np.float32),
         radius=random.uniform(0.001, 0.002, number).astype(np.float32),
         mass=np.ones(number, np.float32),
+        orientation=np.tile([0.0, 0.0, 0.0, 1.0], (number, 1)),
     )
 
 

@@ -81,7 +81,7 @@ def test_good_scene_is_read():
         (("gravity",), [0, 0], "gravity: must be a list of 3 numbers"),
         (("domain",), {"low": [0, 0, 0], "high": [0.05, 1, 1]}, "domain: must contain the region of fill"),
         (("frame_rate",), 0, "frame_rate: must be greater than 0"),
-        (("fills",), [], "fills: at least one fill is needed"),
+        (("fills",), [], "fills: at least one fill, or one of 'bodies', is needed"),
     ],
 )
 def test_refusals_name_the_field_and_the_fix(path, value, named):

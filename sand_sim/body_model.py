@@ -1,0 +1,93 @@
+"""A scene's free rigid bodies made into spheres, masses and meshes."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from sampler import MeshError, locate_mesh, read_mesh, sample_body
+from sand_sim import rotation
+from sand_sim.grain_table import BodyTable, GrainTable
+from sand_sim.scene.clumps import members_of
+from sand_sim.scene.shapes import Shape, principal_shape, read_shape, shape_of_spheres
+from sand_sim.scene.types import Body, Scene, SceneError
+
+
+@dataclass(frozen=True)
+class BodyModel:
+    """A free rigid body.
+
+    Attributes:
+        body: what the scene says.
+        mesh: in the body's own frame; None if it was given by spheres.
+        shape: its spheres in the principal frame.
+        mass: [kg].
+        gyration: principal moments over the mass, shape (3,) [m^2].
+    """
+
+    body: Body
+    mesh: trimesh.Trimesh | None
+    shape: Shape
+    mass: float
+    gyration: np.ndarray
+
+    def table(self, material: int) -> GrainTable:
+        """The body and its spheres where the scene puts them, of the material with this index."""
+        pose = self.body.pose
+        turn = rotation.to_matrices(np.asarray(pose.orientation))
+        row = BodyTable(
+            position=(np.asarray(pose.position) + turn @ self.shape.middle)[None],
+            orientation=rotation.from_matrix(turn @ self.shape.axes)[None],
+            velocity=np.asarray(self.body.velocity, float)[None],
+            spin=np.asarray(self.body.spin, float)[None],
+            mass=np.array([self.mass]),
+            inertia=(self.mass * self.gyration)[None],
+        )
+        owner = np.zeros(len(self.shape.radii), int)
+        return members_of(row, owner, self.shape.centres, self.shape.radii, self.mass / self.shape.volume, material)
+
+    def own_frame(self, position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pose of the body's own frame, (3,) and (4,), from that of its principal frame."""
+        axes = rotation.to_matrices(orientation) @ self.shape.axes.T
+        return position - axes @ self.shape.middle, rotation.from_matrix(axes)
+
+
+def model_body(body: Body, scene: Scene, progress) -> BodyModel:
+    """Sample a body's mesh, or take its spheres, and find its mass properties.
+
+    Args:
+        body: of the scene.
+        scene: for density and paths.
+        progress: as ``assemble``'s.
+
+    Raises:
+        SceneError: if a mesh or a file cannot be used.
+    """
+    density, where = scene.materials[scene.material_index(body.material)].density, f"bodies.{body.name}"
+    mesh = None
+    if body.mesh is not None:
+        try:
+            mesh = read_mesh(locate_mesh(body.mesh, scene.folder), body.scale)
+            skin = sample_body(mesh, body.particle_radius, progress=lambda share: progress(f"sampling {body.name}", share))
+        except MeshError as error:
+            raise SceneError(f"{where}.mesh: {error}") from None
+        if not np.isfinite(skin.volume) and body.inertia is None:
+            raise SceneError(f"{where}.mesh: is not closed, so it has no mass; close it, or give 'mass' and 'inertia'")
+        radii = np.full(len(skin.points), body.particle_radius)
+        inertia = skin.inertia / skin.volume if np.isfinite(skin.volume) else np.eye(3)
+        shape = principal_shape(skin.points, radii, skin.volume, skin.centre, inertia)
+    else:
+        try:
+            shape = read_shape(body.spheres) if isinstance(body.spheres, Path) else _listed(body.spheres)
+        except SceneError as error:
+            raise SceneError(f"{where}.spheres: {error}") from None
+    if body.inertia is not None:
+        shape = shape.with_axes(np.eye(3))
+        return BodyModel(body, mesh, shape, body.mass, np.asarray(body.inertia) / body.mass)
+    return BodyModel(body, mesh, shape, body.mass or density * shape.volume, shape.gyration)
+
+
+def _listed(rows: tuple) -> Shape:
+    spheres = np.asarray(rows, float)
+    return shape_of_spheres(spheres[:, :3], spheres[:, 3])

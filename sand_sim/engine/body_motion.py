@@ -1,0 +1,231 @@
+"""Newton-Euler for rigid bodies of many spheres: gather what their spheres feel, move them, and move the spheres with them."""
+
+from functools import cache
+
+import warp as wp
+
+from sand_sim.engine.flags import FAULT_NOT_FINITE
+from sand_sim.engine.free_rotation import rotate_freely, spin_of
+from sand_sim.engine.kernel import kernel
+from sand_sim.engine.recipe import Recipe
+from sand_sim.integrator import VERLET
+from sand_sim.precision import Precision
+
+
+@kernel
+def find_members(lane: int, spans: wp.array(dtype=int), stride: int, member: wp.array(dtype=int), sphere_at: wp.array(dtype=int)):
+    """The spheres have been renumbered: note where each member is now."""
+    for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+        if member[i] >= 0:
+            sphere_at[member[i]] = i
+
+
+@cache
+def build_gather_body(precision: Precision) -> wp.Function:
+    """Warp function that sums force [N] and torque about the centre of mass [N m] over the spheres of a body."""
+    real, vec3, whole4 = precision.real, precision.vec3, precision.whole4
+
+    @wp.func
+    def gather_body(
+        first: int,
+        last: int,
+        at: whole4,
+        quantum: real,
+        sphere_at: wp.array(dtype=int),
+        place: wp.array(dtype=whole4),
+        felt_force: wp.array(dtype=vec3),
+        felt_torque: wp.array(dtype=vec3),
+    ):
+        force = vec3(real(0.0))
+        torque = vec3(real(0.0))
+        for m in range(first, last):
+            i = sphere_at[m]
+            here = place[i]
+            arm = vec3(real(here[0] - at[0]), real(here[1] - at[1]), real(here[2] - at[2])) * quantum
+            push = felt_force[i]
+            force += push
+            torque += felt_torque[i] + wp.cross(arm, push)
+        return force, torque
+
+    return gather_body
+
+
+@cache
+def build_move_bodies(recipe: Recipe) -> wp.Kernel:
+    """Kernel that advances all bodies by one step, as ``motion.build_move_grains`` does single spheres.
+
+    The angular momentum is advanced like the velocity, the orientation by ``free_rotation.rotate_freely``. A body whose centre
+    leaves the domain is retired with all its spheres.
+    """
+    precision, verlet = recipe.precision, recipe.integrator == VERLET
+    real, whole, vec3, vec4 = precision.real, precision.whole, precision.vec3, precision.vec4
+    whole3, whole4 = precision.whole3, precision.whole4
+    gather_body = build_gather_body(precision)
+
+    @kernel
+    def move_bodies(
+        lane: int,
+        spans: wp.array(dtype=int),
+        stride: int,
+        starts: wp.array(dtype=int),
+        sphere_at: wp.array(dtype=int),
+        offset: wp.array(dtype=vec3),
+        body_place: wp.array(dtype=whole4),
+        remainder: wp.array(dtype=vec3),
+        body_motion: wp.array(dtype=vec4),
+        half_motion: wp.array(dtype=vec3),
+        turn: wp.array(dtype=wp.quatd),
+        momentum: wp.array(dtype=wp.vec3d),
+        inertia: wp.array(dtype=wp.vec3d),
+        place: wp.array(dtype=whole4),
+        motion: wp.array(dtype=vec4),
+        spin: wp.array(dtype=vec4),
+        origin: wp.array(dtype=whole4),
+        felt_force: wp.array(dtype=vec3),
+        felt_torque: wp.array(dtype=vec3),
+        gravity: vec3,
+        dt: real,
+        quantum: real,
+        half_extent: whole3,
+        parking: whole,
+        half_skin: real,
+        starting: wp.array(dtype=int),
+        grains_moved: wp.array(dtype=int),
+        fault: wp.array(dtype=int),
+    ):
+        for b in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            at = body_place[b]
+            if at[3] == whole(0):
+                continue
+            first = starts[b]
+            last = starts[b + 1]
+            force, torque = gather_body(first, last, at, quantum, sphere_at, place, felt_force, felt_torque)
+            old = body_motion[b]
+            gain = (force / old[3] + gravity) * dt
+            push = wp.vec3d(wp.float64(torque[0]), wp.float64(torque[1]), wp.float64(torque[2])) * wp.float64(dt)
+            velocity = vec3(old[0], old[1], old[2]) + gain
+            now = velocity
+            turning = momentum[b] + push
+            turning_now = turning
+            if wp.static(verlet):
+                half = gain * real(0.5)
+                half_push = push * wp.float64(0.5)
+                velocity = half_motion[b] + gain
+                if starting[0] != 0:
+                    velocity -= half
+                    turning -= half_push
+                half_motion[b] = velocity
+                now = velocity + half
+                turning_now = turning + half_push
+            body_motion[b] = vec4(now[0], now[1], now[2], old[3])
+            momentum[b] = turning
+
+            step = velocity * (dt / quantum) + remainder[b]
+            jump = vec3(wp.rint(step[0]), wp.rint(step[1]), wp.rint(step[2]))
+            far = wp.max(wp.max(wp.abs(jump[0]), wp.abs(jump[1])), wp.abs(jump[2]))
+            if not wp.isfinite(far) or not wp.isfinite(wp.length(turning_now)):
+                fault[0] = fault[0] | wp.static(FAULT_NOT_FINITE)
+                continue
+            inside = far < real(parking)
+            x = at[0]
+            y = at[1]
+            z = at[2]
+            if inside:
+                x += whole(jump[0])
+                y += whole(jump[1])
+                z += whole(jump[2])
+                inside = wp.abs(x) <= half_extent[0] and wp.abs(y) <= half_extent[1] and wp.abs(z) <= half_extent[2]
+            if not inside:
+                body_place[b] = whole4(parking, parking, parking, whole(0))
+                for m in range(first, last):
+                    place[sphere_at[m]] = whole4(parking, parking, parking, whole(0))
+                grains_moved[0] = 1
+                continue
+            left = step - jump
+            remainder[b] = left
+            body_place[b] = whole4(x, y, z, at[3])
+            turned = rotate_freely(turn[b], turning, inertia[b], wp.float64(dt))
+            turn[b] = turned
+            omega_d = spin_of(turned, turning_now, inertia[b])
+            omega = vec3(real(omega_d[0]), real(omega_d[1]), real(omega_d[2]))
+            rotation = wp.quaternion(real(turned[0]), real(turned[1]), real(turned[2]), real(turned[3]))
+            for m in range(first, last):
+                i = sphere_at[m]
+                arm = wp.quat_rotate(rotation, offset[m])
+                spot = arm / quantum + left
+                u = x + whole(wp.rint(spot[0]))
+                v = y + whole(wp.rint(spot[1]))
+                w = z + whole(wp.rint(spot[2]))
+                place[i] = whole4(u, v, w, place[i][3])
+                carried = now + wp.cross(omega, arm)
+                motion[i] = vec4(carried[0], carried[1], carried[2], motion[i][3])
+                spin[i] = vec4(omega[0], omega[1], omega[2], spin[i][3])
+                began = origin[i]
+                moved = vec3(real(u - began[0]), real(v - began[1]), real(w - began[2]))
+                if wp.dot(moved, moved) > half_skin * half_skin:
+                    grains_moved[0] = 1
+
+    return move_bodies
+
+
+@cache
+def build_see_bodies(recipe: Recipe) -> wp.Kernel:
+    """Kernel that completes the step of all bodies with the forces of now for lookers, as ``motion.build_complete_step``."""
+    precision, verlet = recipe.precision, recipe.integrator == VERLET
+    real, whole, vec3, vec4, whole4 = precision.real, precision.whole, precision.vec3, precision.vec4, precision.whole4
+    gather_body = build_gather_body(precision)
+
+    @kernel
+    def see_bodies(
+        lane: int,
+        spans: wp.array(dtype=int),
+        stride: int,
+        starts: wp.array(dtype=int),
+        sphere_at: wp.array(dtype=int),
+        offset: wp.array(dtype=vec3),
+        body_place: wp.array(dtype=whole4),
+        body_motion: wp.array(dtype=vec4),
+        half_motion: wp.array(dtype=vec3),
+        turn: wp.array(dtype=wp.quatd),
+        momentum: wp.array(dtype=wp.vec3d),
+        inertia: wp.array(dtype=wp.vec3d),
+        place: wp.array(dtype=whole4),
+        felt_force: wp.array(dtype=vec3),
+        felt_torque: wp.array(dtype=vec3),
+        gravity: vec3,
+        dt: real,
+        quantum: real,
+        starting: wp.array(dtype=int),
+        seen_motion: wp.array(dtype=vec4),
+        seen_spin: wp.array(dtype=vec3),
+        seen_body_velocity: wp.array(dtype=wp.vec3d),
+        seen_body_spin: wp.array(dtype=wp.vec3d),
+    ):
+        for b in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            at = body_place[b]
+            if at[3] == whole(0):
+                continue
+            first = starts[b]
+            last = starts[b + 1]
+            of_b = body_motion[b]
+            velocity = vec3(of_b[0], of_b[1], of_b[2])
+            turning = momentum[b]
+            if wp.static(verlet) and starting[0] == 0:
+                force, torque = gather_body(first, last, at, quantum, sphere_at, place, felt_force, felt_torque)
+                velocity = half_motion[b] + (force / of_b[3] + gravity) * (real(0.5) * dt)
+                push = wp.vec3d(wp.float64(torque[0]), wp.float64(torque[1]), wp.float64(torque[2]))
+                turning += push * (wp.float64(0.5) * wp.float64(dt))
+            omega = spin_of(turn[b], turning, inertia[b])
+            seen_body_velocity[b] = wp.vec3d(wp.float64(velocity[0]), wp.float64(velocity[1]), wp.float64(velocity[2]))
+            seen_body_spin[b] = omega
+            if wp.static(verlet):
+                spinning = vec3(real(omega[0]), real(omega[1]), real(omega[2]))
+                turned = turn[b]
+                rotation = wp.quaternion(real(turned[0]), real(turned[1]), real(turned[2]), real(turned[3]))
+                for m in range(first, last):
+                    i = sphere_at[m]
+                    carried = velocity + wp.cross(spinning, wp.quat_rotate(rotation, offset[m]))
+                    seen_motion[i] = vec4(carried[0], carried[1], carried[2], real(0.0))
+                    seen_spin[i] = spinning
+
+    return see_bodies
