@@ -38,7 +38,9 @@ _IMPACT = Preparation("impact", (*CHOICES, stepped(8.0, quick=True)), repeats=8)
 _COLUMN = Preparation(
     "spread",
     quick=Variation(
-        "", "grains 1.3 times as large, up to 0.25 s", (Edit("fills.*.radius", times(1.3)), Edit("duration", to(0.25)))
+        "",
+        "grains 1.3 times as large, up to 0.25 s",
+        (Edit("fills.*.radius", times(1.3)), Edit("duration", to(0.25)), Edit("settle.time", to(0.2))),
     ),
 )
 _DIG = Preparation(
