@@ -37,7 +37,7 @@ def _rolling(friction: float, quick: bool = False) -> Variation:
 
 _LINEAR = (Edit("contact.normal", to("linear")), Edit("pairs.*.stiffness", springs(1.0)))
 _LINEAR_SHEAR = (Edit("contact.tangential", to("linear")), Edit("pairs.*.shear_stiffness", springs(2.0 / 7.0)))
-_VISCOUS = (Edit("contact.tangential", to("viscous")), Edit("pairs.*.shear_viscosity", dampers(1.0)))
+_VISCOUS = (Edit("contact.tangential", to("viscous")), Edit("pairs.*.shear_viscosity", dampers(2.0 / 7.0)))
 
 CHOICES = (
     stepped(0.5, quick=True),

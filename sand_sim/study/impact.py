@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sand_sim.scene.time_step import effective_young
+from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.types import Scene, SceneError
 from sand_sim.study.sample import Sample
 from sand_sim.world import World
@@ -83,7 +83,6 @@ def _bodies(world: World) -> tuple[float, float, float, float]:
     """Effective radius [m], mass [kg] and modulus [Pa] of the two bodies, and their restitution [1]."""
     scene, grains = world.scene, world.observe().grains
     planes = [wall for wall in world.assembly.walls if wall.kind == "plane"]
-    named = {material.name: material for material in scene.materials}
     owners = [fill.material for fill, number in zip(scene.fills, world.assembly.fill_numbers, strict=True) for _ in range(number)]
     if len(grains) == 2:
         first, second = owners
@@ -93,8 +92,8 @@ def _bodies(world: World) -> tuple[float, float, float, float]:
         radius, mass = grains.radius[0], grains.mass[0]
     else:
         raise SceneError("an impact is one grain and one plane, or two grains; choose another --quantity")
-    young = effective_young(named[first], named[second])
-    return float(radius), float(mass), young, scene.pair(first, second).restitution
+    pair = pair_numbers(scene, first, second)
+    return float(radius), float(mass), pair.young, pair.given["restitution"]
 
 
 def _approach(world: World) -> tuple[float, float]:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from sand_sim.assemble import assemble
-from sand_sim.observing import observe_grains
 from sand_sim.scene.types import Scene, unit
 
 _UNSCALED = ("weights",)  # numbers inside a scaled entry that are no lengths
@@ -42,14 +41,15 @@ class Facts:
             SceneError: if it cannot be made into a world.
         """
         assembly = assemble(scene)
-        grains = observe_grains(assembly)
+        grains = assembly.solver.arrays.grains
+        number = grains.active.get()
         return cls(
             step=assembly.time_step.safe,
             contact=assembly.time_step.contact,
             frame=1.0 / scene.frame_rate,
-            radius=float(grains.radius.mean()),
-            mass=float(grains.mass.mean()),
-            grains=len(grains),
+            radius=float(grains.place.numpy()[:number, 3].mean() * assembly.lattice.quantum),
+            mass=float(grains.motion.numpy()[:number, 3].mean()),
+            grains=number,
         )
 
 
@@ -137,7 +137,7 @@ def springs(factor: float) -> Change:
 
 
 def dampers(factor: float) -> Change:
-    """A linear damping, in multiples of ``pi m*/t_c``, that of a grain stopped within about one contact time [N s/m]."""
+    """A linear damping, in multiples of ``pi m*/t_c``, which slows mean grains down within a contact time [N s/m]."""
     return lambda old, facts: factor * 0.5 * facts.mass * np.pi / facts.contact
 
 
