@@ -1,9 +1,10 @@
 """Measure what each choice of a scene costs in run time and accuracy, and recommend the cheapest that is accurate enough.
 
-The scene is run with its time step, stiffness, integrator, precision, contact law, grain shape, grain size and skin varied one by
-one, then with the best of each together. Every run is compared with a closed form where there is one (one impact), else with the
-mean of runs resolved more finely. Repeats differ by chance only: seeds, or the moment of a contact within a step. Only the steps
-are timed, after grains have settled and kernels are compiled; settings take turns.
+The scene is run with its time step, stiffness, integrator, precision, contact law, grain shape, grain size and skin varied one
+by one, then with the best of each together. Where there is a closed form (one impact) every run is compared with it. Elsewhere
+single runs are chaotic, and the mean over repeats is compared with that of runs resolved more finely. Repeats differ by chance
+only: seeds, or the moment of a contact within a step. Only the steps are timed, after grains have settled and kernels are
+compiled; settings take turns.
 """
 
 import argparse
@@ -91,16 +92,16 @@ def _sum_up(study: Study, chosen: tuple | None, tolerance: float) -> None:
     if orders:
         print("  order in the time step: " + ", ".join(f"{name} {order:.2f}" for name, order in orders.items()))
     if scatter is not None:
-        print(f"  runs of the reference that differ by chance only lie {percent(scatter)} from one another")
+        print(f"  by chance alone, two sets of runs of the reference lie {percent(scatter)} apart")
     if chosen is None:
         best = min((row for row in study.rows() if row.trusted), key=lambda row: row.error.high, default=None)
-        nearest = f"; the nearest is '{best.title}' with {percent(best.error.high)} at worst" if best else ""
+        nearest = f"; the nearest is '{best.title}' with {percent(best.error.high)}" if best else ""
         print(f"  recommended: nothing, no setting that can be trusted is within {percent(tolerance)}{nearest}")
         return
     row = chosen[1]
     print(
         f"  recommended: {row.title}, the cheapest within {percent(tolerance)}: "
-        f"{percent(row.error.high)} at worst in {seconds(row.time.median)}"
+        f"{percent(row.error.high)} at most in {seconds(row.time.middle)}"
     )
 
 

@@ -9,19 +9,19 @@ SAVING = 0.05  # of the run time; less is not worth another setting
 
 @dataclass(frozen=True)
 class Spanned:
-    """A median and the range around it.
+    """A value and the range around it.
 
     Attributes:
-        median, low, high: in the unit of what is measured.
+        middle, low, high: in the unit of what is measured.
     """
 
-    median: float
+    middle: float
     low: float
     high: float
 
     @classmethod
     def of(cls, values: list[float]) -> "Spanned":
-        """Of some values."""
+        """Median and range of some values."""
         return cls(float(np.median(values)), float(np.min(values)), float(np.max(values)))
 
 
@@ -31,9 +31,9 @@ class Row:
 
     Attributes:
         group, name: of the variation.
-        error: largest relative distance from the reference [1], over repeats; None if it was not run.
+        error: largest relative distance from the reference [1]; None if it was not run or there is nothing to compare it with.
         time: run time of the steps [s], over repeats; None if it was not run.
-        parts: relative distances by what is compared [1], over repeats.
+        parts: relative distances by what is compared [1].
         time_step: [s].
         steps: number of steps.
         runs: number of repeats.
@@ -65,7 +65,7 @@ class Row:
         return self.error is not None and self.time is not None and not self.doubts and not self.refusal
 
     def within(self, tolerance: float) -> bool:
-        """Whether it is trusted and even the worst of its repeats is within a tolerance [1]."""
+        """Whether it is trusted and even the upper end of its error is within a tolerance [1]."""
         return self.trusted and self.error.high <= tolerance
 
 
@@ -81,9 +81,9 @@ def find_front(time: list[float], error: list[float]) -> list[bool]:
 
 
 def mark_front(rows: list[Row]) -> list[Row]:
-    """The same rows, with those on the front of medians marked; only trusted ones count."""
+    """The same rows, with those on the front marked; only trusted ones count."""
     trusted = [row for row in rows if row.trusted]
-    front = find_front([row.time.median for row in trusted], [row.error.median for row in trusted])
+    front = find_front([row.time.middle for row in trusted], [row.error.middle for row in trusted])
     best = {row.title for row, on in zip(trusted, front, strict=True) if on}
     return [replace(row, front=row.trusted and row.title in best) for row in rows]
 
@@ -95,7 +95,7 @@ def recommend(rows: list[Row], written: Row, tolerance: float) -> Row | None:
         None if no setting is within the tolerance.
     """
     good = [row for row in rows if row.within(tolerance)]
-    cheapest = min(good, key=lambda row: row.time.median, default=None)
+    cheapest = min(good, key=lambda row: row.time.middle, default=None)
     if cheapest is not None and written.within(tolerance) and not saves(cheapest, written):
         return written
     return cheapest
@@ -103,7 +103,7 @@ def recommend(rows: list[Row], written: Row, tolerance: float) -> Row | None:
 
 def saves(row: Row, written: Row) -> bool:
     """Whether a setting is faster than another by more than what repeated timing explains."""
-    return row.time.median < (1.0 - SAVING) * written.time.median and row.time.high < written.time.low
+    return row.time.middle < (1.0 - SAVING) * written.time.middle and row.time.high < written.time.low
 
 
 def best_of_groups(rows: list[Row], written: Row, tolerance: float) -> list[Row]:
@@ -112,7 +112,7 @@ def best_of_groups(rows: list[Row], written: Row, tolerance: float) -> list[Row]
     for row in rows:
         if row.group and row.within(tolerance) and saves(row, written):
             known = best.get(row.group)
-            if known is None or row.time.median < known.time.median:
+            if known is None or row.time.middle < known.time.middle:
                 best[row.group] = row
     return list(best.values())
 

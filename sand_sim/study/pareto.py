@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.scene.reading import read_scene
 from sand_sim.scene.types import SceneError
@@ -109,7 +111,7 @@ class Study:
         together = self._candidate(Variation("together", ", ".join(one.title for one in chosen), edits))
         self._candidates.append(together)
         for repeat in range(self.plan.repeats):
-            self._run_round([self.written, together], repeat)
+            self._run_round([self.written, together], self.plan.repeats + repeat)
 
     def rows(self) -> list[Row]:
         """What came of all settings that were run or refused; empty while there is nothing to compare with."""
@@ -132,10 +134,9 @@ class Study:
         return convergence_orders([row for row in self.rows() if row.group in ("", "time step")])
 
     def scatter(self) -> float | None:
-        """How far runs of the reference that differ by chance lie from one another: a tolerance below it cannot be met [1]."""
-        if self.reference is None or len(self.reference.samples) < 2:
-            return None
-        return self._row(self.reference).error.median
+        """How far two sets of runs of the reference lie from one another by chance: errors below it mean nothing [1]."""
+        error = self._row(self.reference).error if self.reference else None
+        return error and error.middle
 
     def _candidate(self, variation: Variation) -> Candidate:
         candidate = Candidate(variation, self._parsed)
@@ -150,7 +151,8 @@ class Study:
         runnable = [one for one in candidates if not one.refusal]
         for number, one in enumerate(runnable, 1):
             self._check()
-            where = f"repeat {repeat + 1}/{self.plan.repeats}, setting {number}/{len(runnable)}"
+            further = " of the best together" if repeat >= self.plan.repeats else ""
+            where = f"repeat {repeat % self.plan.repeats + 1}/{self.plan.repeats}{further}, setting {number}/{len(runnable)}"
             self._progress(f"{where}, {time.monotonic() - self._begun:.0f} s: {one.variation.title}")
             try:
                 scene = read_scene(repeated(one.parsed, repeat, self.facts), self._folder)
@@ -171,21 +173,53 @@ class Study:
         row = Row(variation.group, variation.name, refusal=candidate.refusal, runs=len(samples))
         if not samples or candidate.refusal:
             return row
-        parts = [self._quantity.errors(one, reference) for one, reference in self._pairs(candidate)]
+        errors = self._errors(candidate)
         return replace(
             row,
-            error=Spanned.of([max(part.values()) for part in parts]) if parts else None,
+            error=errors.pop("", None),
             time=Spanned.of([one.wall for one in samples]),
-            parts={name: Spanned.of([part[name] for part in parts]) for name in (parts[0] if parts else ())},
+            parts=errors,
             time_step=samples[0].time_step,
             steps=samples[0].steps,
             doubts=tuple(dict.fromkeys(doubt for one in samples for doubt in one.doubts)),
         )
 
-    def _pairs(self, candidate: Candidate) -> list[tuple[Sample, Sample]]:
-        """Each run with what it is compared with: the mean of the reference's runs, for these the mean of the others."""
-        references = self._reference_samples()
-        if candidate is not self.reference:
-            return [(one, mean_sample(references)) for one in candidate.samples]
-        others = [[other for other in references if other is not one] for one in references]
-        return [(one, mean_sample(rest)) for one, rest in zip(references, others, strict=True) if rest]
+    def _errors(self, candidate: Candidate) -> dict[str, Spanned]:
+        """Distances from the reference by what is compared, and under the empty name the largest.
+
+        With a closed form: median and range over the runs. Else runs are chaotic, and their mean is compared with the mean of the
+        reference's runs; the range is that of leaving out one run. For the reference itself it is the distance that chance makes
+        of two such means: a run lies ``sqrt(n / (n - 1))`` standard deviations from the mean of the others, the means of two
+        sets of n runs lie ``sqrt(2 / n)`` apart.
+        """
+        samples, references, measure = candidate.samples, self._reference_samples(), self._quantity.errors
+        if candidate is self.reference:
+            number = len(samples)
+            chance = [
+                _scaled(measure(one, mean), np.sqrt(2.0 * (number - 1)) / number) for one, mean in _each_and_others(samples)
+            ]
+            middle = None
+        elif self._exact:
+            chance, middle = [measure(one, self._exact) for one in samples], None
+        else:
+            mean = mean_sample(references)
+            chance = [measure(others, mean) for _, others in _each_and_others(samples)]
+            middle = measure(mean_sample(samples), mean)
+            chance.append(middle)
+        if not chance:
+            return {}
+        tables = [{"": max(table.values())} | table for table in chance]
+        spans = {name: Spanned.of([table[name] for table in tables]) for name in tables[0]}
+        if middle is None:
+            return spans
+        return {name: replace(span, middle=tables[-1][name]) for name, span in spans.items()}
+
+
+def _each_and_others(samples: list[Sample]) -> list[tuple[Sample, Sample]]:
+    """Each run with the mean of the others; empty for a single run."""
+    others = [[other for other in samples if other is not one] for one in samples]
+    return [(one, mean_sample(rest)) for one, rest in zip(samples, others, strict=True) if rest]
+
+
+def _scaled(errors: dict[str, float], factor: float) -> dict[str, float]:
+    return {name: float(factor * error) for name, error in errors.items()}

@@ -47,18 +47,16 @@ _DIG = Preparation(
     "wrench",
     shortening=Variation(
         "",
-        "grains 1.3 times as large, bed 0.48 m x 0.22 m, up to the end of the cut at 1.7 s",
+        "grains 1.3 times as large, bed 0.45 m long, up to 1.2 s, 0.9 s of them in the cut",
         (
             Edit("fills.*.radius", times(1.3)),
-            Edit("fills.*.region.low", to([0.0, -0.11, 0.0])),
-            Edit("fills.*.region.high", to([0.48, 0.11, 0.3])),
-            Edit("boundaries.*.low", to([0.0, -0.11, 0.0])),
-            Edit("boundaries.*.high", to([0.48, 0.11, 0.3])),
+            Edit("fills.*.region.high.0", to(0.45)),
+            Edit("boundaries.*.high.0", to(0.45)),
             Edit("settle.time", to(0.4)),
-            Edit("duration", to(1.7)),
+            Edit("duration", to(1.2)),
         ),
     ),
-    quick=Variation("", "only up to 1.0 s", (Edit("duration", to(1.0)), Edit("settle.time", to(0.3)))),
+    quick=Variation("", "grains another 1.2 times as large", (Edit("fills.*.radius", times(1.2)), Edit("settle.time", to(0.3)))),
 )
 _READY = {"impact.yaml": _IMPACT, "column.yaml": _COLUMN, "dig.yaml": _DIG}
 

@@ -7,7 +7,7 @@ from sand_sim.study.comparison import Row, Spanned
 
 def table_text(rows: list[Row]) -> str:
     """All settings, the fastest first, with the Pareto front marked ``*`` and those not to be trusted ``!``."""
-    run = sorted((row for row in rows if row.time), key=lambda row: row.time.median)
+    run = sorted((row for row in rows if row.time), key=lambda row: row.time.middle)
     lines = [("", "setting", "error (range)", "run time (range)", "time step", "steps")]
     for row in run:
         mark = "!" if row.doubts else "*" if row.front else ""
@@ -52,11 +52,11 @@ def seconds(value: float) -> str:
 
 
 def _spanned(value: Spanned, show) -> str:
-    return f"{show(value.median)} ({show(value.low)} to {show(value.high)})"
+    return f"{show(value.middle)} ({show(value.low)} to {show(value.high)})"
 
 
 def _plain(value: Spanned | None) -> dict | None:
-    return value and {name: _finite(getattr(value, name)) for name in ("median", "low", "high")}
+    return value and {name: _finite(getattr(value, name)) for name in ("middle", "low", "high")}
 
 
 def _finite(value: float) -> float | None:
