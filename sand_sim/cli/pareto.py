@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     defaults = ", ".join(f"{percent(value)} for {name}" for name, value in TOLERANCES.items()).replace("%", "%%")
     parser.add_argument("--tolerance", type=_positive, help=f"largest relative error that will do, as 0.05 (default: {defaults})")
     parser.add_argument("--repeats", type=_count, help="runs of each setting (default: 3, of one impact 8, with --quick 2)")
-    parser.add_argument("--write", type=Path, metavar="FILE", help="write the scene with the recommended setting")
+    parser.add_argument("--write", type=Path, metavar="FILE", help="write the scene, else unchanged, with what is recommended")
     parser.add_argument("--quick", action="store_true", help="fewer settings, of a shorter run where the scene is one of ours")
     parser.add_argument("--quantity", choices=QUANTITIES, help="what is compared; chosen from the scene if left out")
     parser.add_argument(

@@ -81,6 +81,8 @@ class Study:
         self._exact = self._quantity.exact(scene)
         self.written = self._candidate(WRITTEN)
         self.reference = None if self._exact else self._candidate(REFERENCE)
+        if self.reference and self.reference.refusal:
+            raise SceneError(f"{REFERENCE.title}: {self.reference.refusal}")
         self._candidates = [one for one in (self.written, self.reference) if one]
         known = [scene]
         for variation in plan.variations:
@@ -158,12 +160,10 @@ class Study:
                 scene = read_scene(repeated(one.parsed, repeat, self.facts), self._folder)
                 world = World(scene, lambda stage, share: self._check())
                 one.samples.append(self._quantity.measure(world, self._check))
-            except UnstableError as error:
-                one.refusal = f"unstable: {error}"
-            except SceneError as error:
+            except (SceneError, UnstableError) as error:
                 if one in (self.written, self.reference):
-                    raise
-                one.refusal = str(error)
+                    raise SceneError(f"{one.variation.title}: {error}") from None
+                one.refusal = f"unstable: {error}" if isinstance(error, UnstableError) else str(error)
 
     def _reference_samples(self) -> list[Sample]:
         return [self._exact] if self._exact else self.reference.samples
