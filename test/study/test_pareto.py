@@ -76,7 +76,7 @@ def test_interrupted_study_keeps_what_was_run(small):
 
 
 def test_impact_converges_with_the_square_of_the_step(tmp_path):
-    """The errors of the package's own impact fall with the square of the time step, and only the finest meets a tight tolerance."""
+    """Errors of the package's own impact fall with the square of the step, and only the finest meets a tight tolerance."""
     scene = tmp_path / "written.yaml"
     words = ["pareto", "impact", "--repeats", "3", "--tolerance", "0.0001", "--out", str(tmp_path), "--write", str(scene)]
     assert main(words) == 0
