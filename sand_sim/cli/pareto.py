@@ -73,7 +73,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     if not rows:
         return 130
     notes = [one.name for one in shortenings if one is not WHOLE]
-    print(f"{scene.name}: {plan.quantity}, {plan.repeats} repeats{', shortened: ' if notes else ''}{'; '.join(notes)}")
+    print(f"{scene.name}, by its {plan.quantity}, {plan.repeats} repeats{', shortened: ' if notes else ''}{'; '.join(notes)}")
     print(table_text(rows))
     chosen = study.recommendation()
     _sum_up(study, chosen, tolerance)
@@ -92,7 +92,7 @@ def _sum_up(study: Study, chosen: tuple | None, tolerance: float) -> None:
     if orders:
         print("  order in the time step: " + ", ".join(f"{name} {order:.2f}" for name, order in orders.items()))
     if scatter is not None:
-        print(f"  by chance alone, two sets of runs of the reference lie {percent(scatter)} apart")
+        print(f"  by chance alone, two sets of runs of the reference lie {percent(scatter)} apart; smaller errors mean nothing")
     if chosen is None:
         best = min((row for row in study.rows() if row.trusted), key=lambda row: row.error.high, default=None)
         nearest = f"; the nearest is '{best.title}' with {percent(best.error.high)}" if best else ""
@@ -125,7 +125,7 @@ def _write(study: Study, name: str, chosen: tuple | None, notes: list[str], fold
     try:
         from sand_sim.study.pareto_figure import draw_pareto
 
-        title = f"{name}: {plan.quantity}, {plan.repeats} repeats" + (f"\n{'; '.join(notes)}" if notes else "")
+        title = f"{name}, by its {plan.quantity}, {plan.repeats} repeats" + (f"\n{'; '.join(notes)}" if notes else "")
         draw_pareto(rows, plan.tolerance, scatter, recommended, title, folder / f"{name}_pareto.png")
         files.append(folder / f"{name}_pareto.png")
     except ModuleNotFoundError:
