@@ -72,8 +72,8 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     rows = study.rows()
     if not rows:
         return 130
-    notes = [one.name for one in shortenings if one is not WHOLE]
-    print(f"{scene.name}, by its {plan.quantity}, {plan.repeats} repeats{', shortened: ' if notes else ''}{'; '.join(notes)}")
+    notes = [one.name for one in shortenings if one is not WHOLE] + ["interrupted"] * stopped
+    print(f"{scene.name}, by its {plan.quantity}, {plan.repeats} repeats{': ' if notes else ''}{'; '.join(notes)}")
     print(table_text(rows))
     chosen = study.recommendation()
     _sum_up(study, chosen, tolerance)
@@ -115,7 +115,7 @@ def _write(study: Study, name: str, chosen: tuple | None, notes: list[str], fold
         "scene": name,
         "quantity": plan.quantity,
         "tolerance": plan.tolerance,
-        "shortened": notes,
+        "notes": notes,
         "scatter": scatter,
         "order_in_time_step": study.orders(),
         "recommended": recommended or None,
