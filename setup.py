@@ -22,7 +22,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (SHARE, ["package.xml"]),
-        (f"{SHARE}/config", glob("config/*.yaml")),
+        (f"{SHARE}/config", glob("config/*.yaml") + glob("config/*.csv")),
         (f"{SHARE}/config/meshes", glob("config/meshes/*.stl")),
         (f"{SHARE}/launch", glob("launch/*.launch.py")),
     ],

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 import trimesh
-from scenes import SceneMaker
+import yaml
+from scenes import SceneMaker, write_small_scene
 
 from sand_sim import CommandError, ToolPose, World, read_scene
+from sand_sim.playing import commands_at
 
 GRAIN = {"density": 2500.0, "young": 1e7, "poisson": 0.25}
 NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
@@ -136,3 +138,23 @@ def test_saved_state_goes_on_to_the_bit(make_plate_world):
     assert all(expected[name].tobytes() == found[name].tobytes() for name in expected)
     world.reset()
     assert world.time == 0.0
+
+
+def test_list_that_outgrows_its_room_changes_nothing(tmp_path):
+    """A thick skin lists so many tool particles that room is made in mid-run; forces between grains must go on both ways."""
+    parsed = yaml.safe_load(write_small_scene(tmp_path).read_text())
+    last, room = [], []
+    for skin in (0.1 * 0.005, 1.0 * 0.005):
+        world = World(read_scene(parsed | {"solver": {"skin": skin, "precision": "double"}}, tmp_path))
+        room.append(world.assembly.solver.arrays.tool_list.pairs.capacity)
+        for time in (0.1, 0.2, 0.3):
+            for command in commands_at(world.scene, time):
+                world.apply(command)
+            world.step(round((time - world.time) / world.time_step))
+        room.append(world.assembly.solver.arrays.tool_list.pairs.capacity)
+        last.append(world.observe())
+    assert room[0] == room[1] == room[2] < room[3]
+    assert last[0].tool("plate").work > 1e-3
+    assert last[1].tool("plate").work == pytest.approx(last[0].tool("plate").work, rel=1e-9)
+    assert last[1].health.deepest == pytest.approx(last[0].health.deepest, rel=1e-9)
+    assert np.abs(last[1].grains.position - last[0].grains.position).max() < 1e-12

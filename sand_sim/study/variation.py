@@ -1,0 +1,188 @@
+"""Named edits of a scene as YAML gives it, before it is read: what a variation changes is data, and may be refused."""
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sand_sim.assemble import assemble
+from sand_sim.scene.types import Scene, unit
+
+_UNSCALED = ("weights",)  # numbers inside a scaled entry that are no lengths
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What the numbers of a variation are reckoned from, measured on the scene that it starts from.
+
+    Attributes:
+        step: safe time step [s].
+        contact: shortest contact time [s].
+        frame: time between two observations [s].
+        radius: mean of the grains [m].
+        mass: mean of the grains [kg].
+        grains: number of them.
+    """
+
+    step: float
+    contact: float
+    frame: float
+    radius: float
+    mass: float
+    grains: int
+
+    @classmethod
+    def of(cls, scene: Scene) -> "Facts":
+        """Measure a scene.
+
+        Raises:
+            SceneError: if it cannot be made into a world.
+        """
+        assembly = assemble(scene)
+        grains = assembly.solver.arrays.grains
+        number = grains.active.get()
+        return cls(
+            step=assembly.time_step.safe,
+            contact=assembly.time_step.contact,
+            frame=1.0 / scene.frame_rate,
+            radius=float(grains.place.numpy()[:number, 3].mean() * assembly.lattice.quantum),
+            mass=float(grains.motion.numpy()[:number, 3].mean()),
+            grains=number,
+        )
+
+
+Change = Callable[[Any, Facts], Any]  # from the entry as it is (None if absent) to what it becomes (None leaves it alone)
+
+
+@dataclass(frozen=True)
+class Edit:
+    """A change of one entry; ``*`` in the path stands for all entries of a list or mapping, missing mappings are made."""
+
+    path: str
+    change: Change
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A scene with one choice made differently.
+
+    Attributes:
+        group: the choice.
+        name: how it is made.
+        edits: of the scene.
+        quick: whether it belongs to a quick study.
+    """
+
+    group: str
+    name: str
+    edits: tuple[Edit, ...] = ()
+    quick: bool = False
+
+    def apply(self, parsed: dict, facts: Facts) -> dict:
+        """The edited scene; ``parsed`` stays as it is."""
+        edited = deepcopy(parsed)
+        for edit in self.edits:
+            _change(edited, edit.path.split("."), edit.change, facts)
+        return edited
+
+    @property
+    def title(self) -> str:
+        """Group and name."""
+        return f"{self.group}: {self.name}" if self.group else self.name
+
+
+def to(value: Any) -> Change:
+    """Set an entry."""
+    return lambda old, facts: value
+
+
+def times(factor: float) -> Change:
+    """Multiply an entry, or all numbers in it, where it is given."""
+    return lambda old, facts: None if old is None else _scale(old, factor)
+
+
+def counted(factor: float) -> Change:
+    """Multiply a count where it is given."""
+    return lambda old, facts: None if old is None else max(1, round(int(old) * factor))
+
+
+def where_given(value: Any) -> Change:
+    """Set an entry that the scene gives, leave it out where the scene does."""
+    return lambda old, facts: None if old is None else value
+
+
+def steps(factor: float) -> Change:
+    """A multiple of the safe time step, shortened so that whole steps make a frame [s]."""
+    return lambda old, facts: float(facts.frame / np.ceil(facts.frame / (factor * facts.step)))
+
+
+def automatic(old: Any, facts: Facts) -> Any:
+    """Leave the choice to the scene where it is not left to it already."""
+    return None if old in (None, "auto") else "auto"
+
+
+def skins(factor: float) -> Change:
+    """A multiple of the mean grain radius [m]."""
+    return lambda old, facts: factor * facts.radius
+
+
+def springs(factor: float) -> Change:
+    """A linear stiffness, in multiples of the one whose contacts between mean grains last as long as Hertz's shortest [N/m].
+
+    ``k = m* (pi / t_c)^2`` with ``m*`` half the mass of a grain.
+    """
+    return lambda old, facts: factor * 0.5 * facts.mass * (np.pi / facts.contact) ** 2
+
+
+def dampers(factor: float) -> Change:
+    """A linear damping, in multiples of ``pi m*/t_c``, which slows mean grains down within a contact time [N s/m]."""
+    return lambda old, facts: factor * 0.5 * facts.mass * np.pi / facts.contact
+
+
+def repeated(parsed: dict, repeat: int, facts: Facts) -> dict:
+    """A scene that differs from ``parsed`` by chance only, to see how much chance does; repeat zero is the scene itself.
+
+    Fills take other seeds. Where grains come from a file, planes are moved back by up to a thousandth of a radius instead, so
+    that contacts begin elsewhere within a time step and sums round differently.
+    """
+    changed, random = deepcopy(parsed), np.random.default_rng(repeat)
+    if repeat == 0:
+        return changed
+    for fill in changed["fills"]:
+        if "file" not in fill:
+            fill["seed"] = int(fill.get("seed", 0)) + 1000 * repeat
+    if any("file" in fill for fill in changed["fills"]):
+        for plane in changed.get("boundaries", ()):
+            if plane.get("type") == "plane":
+                shift = 1e-3 * facts.radius * random.uniform() * unit(plane["normal"])
+                plane["point"] = [float(p) - float(s) for p, s in zip(plane["point"], shift, strict=True)]
+    return changed
+
+
+def _scale(value: Any, factor: float) -> Any:
+    if isinstance(value, dict):
+        return {key: inner if key in _UNSCALED else _scale(inner, factor) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_scale(inner, factor) for inner in value]
+    return float(f"{float(value) * factor:.6g}")
+
+
+def _change(node: Any, keys: list[str], change: Change, facts: Facts) -> None:
+    key, *rest = keys
+    if key == "*":
+        for inner in node.values() if isinstance(node, dict) else node or ():
+            _change(inner, rest, change, facts)
+        return
+    place = int(key) if isinstance(node, list) else key
+    present = place < len(node) if isinstance(node, list) else place in node
+    if rest:
+        inner = node[place] if present else {}
+        _change(inner, rest, change, facts)
+        if not present and inner:
+            node[place] = inner
+        return
+    new = change(node[place] if present else None, facts)
+    if new is not None:
+        node[place] = float(new) if isinstance(new, np.floating) else new
