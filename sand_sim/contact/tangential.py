@@ -90,7 +90,7 @@ def build_linear(precision: Precision, types: ContactTypes) -> wp.Function:
     @wp.func
     def linear(contact: types.contact, pair: types.pair, normal_force: real, spring: vec3, dt: real):
         stretched = turned(spring, contact.normal) + contact.slip * dt
-        viscous = contact.slip * (pair.linear_shear_damping * wp.sqrt(contact.mass))
+        viscous = contact.slip * (pair.linear_shear_damping * wp.sqrt(contact.mass) * contact.share)
         force = -stretched * pair.shear_stiffness - viscous
         return bounded(force, viscous, stretched, pair.shear_stiffness, pair.friction * normal_force)
 
