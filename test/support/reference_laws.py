@@ -13,6 +13,12 @@ def split(vector, normal):
     return along, vector - along * normal
 
 
+def cut(vector, length):
+    """The vector, no longer than a length."""
+    size = np.linalg.norm(vector)
+    return vector * (length / size) if size > length else vector
+
+
 def turned(spring, normal):
     """A spring turned into the tangent plane; it keeps its length but for what a turn by a milliradian takes."""
     out, flat = split(spring, normal)
@@ -62,13 +68,9 @@ def viscoelastic(c, p, memory):
 def bounded(c, p, memory, push, stiffness, viscosity):
     _, slip = split(c["velocity"], c["normal"])
     spring = turned(memory.get("spring", np.zeros(3)), c["normal"]) + slip * growth(c, p)
-    drag = -stiffness * spring - viscosity * slip
-    size, bound = np.linalg.norm(drag), p["friction"] * push
-    if size > bound:
-        drag *= bound / size
-        spring = -(drag + viscosity * slip) / stiffness
-    memory["spring"] = spring
-    return drag
+    bound = p["friction"] * push
+    memory["spring"] = cut(spring, bound / stiffness)
+    return cut(-stiffness * memory["spring"] - viscosity * slip, bound)
 
 
 def viscous(c, p, memory, push):
@@ -108,13 +110,8 @@ def rolling_spring(c, p, memory, push):
     arm = p["rolling_friction"] * c["radius"]
     stiffness = 2.25 * 2.0 * p["young"] * np.sqrt(c["radius"] * c["overlap"]) * arm**2
     damping = 2.0 * 0.3 * np.sqrt(stiffness * 7.0 / 5.0 * c["mass"] * c["least"] ** 2)
-    moment = -stiffness * angle - damping * rolling
-    size, bound = np.linalg.norm(moment), arm * push
-    if size > bound:
-        moment *= bound / size
-        angle = -(moment + damping * rolling) / stiffness
-    memory["rolled"] = angle
-    return moment
+    memory["rolled"] = cut(angle, arm * push / stiffness)
+    return cut(-stiffness * memory["rolled"] - damping * rolling, arm * push)
 
 
 def twisting_marshall(c, p, memory, push):
@@ -124,13 +121,10 @@ def twisting_marshall(c, p, memory, push):
     share, overlap = damped(c, p)
     damping = share * 2.0 * p["ratio"] * np.sqrt(8.0 * p["shear"] * np.sqrt(c["radius"] * overlap) * c["mass"])
     angle = memory.get("twisted", 0.0) + rate * growth(c, p)
-    moment = -0.5 * patch**2 * (stiffness * angle + damping * rate)
     bound = 2.0 / 3.0 * patch * p["friction"] * push
-    if abs(moment) > bound:
-        moment = np.sign(moment) * bound
-        angle = -(moment / (0.5 * patch**2) + damping * rate) / stiffness
-    memory["twisted"] = angle
-    return moment * c["normal"]
+    limit = bound / (0.5 * patch**2 * stiffness)
+    memory["twisted"] = np.clip(angle, -limit, limit)
+    return np.clip(-0.5 * patch**2 * (stiffness * memory["twisted"] + damping * rate), -bound, bound) * c["normal"]
 
 
 def capillary(c, p, memory):
