@@ -60,7 +60,7 @@ LINEAR = {"normal": "linear", "tangential": "linear"}
 
 
 def rebound(make_world, partner, speed, **further):
-    """Rebound over impact speed of a grain that meets another or a floor, with the time step a user gets who does not choose it."""
+    """Rebound over impact speed of a grain that meets another or a floor, at the automatic time step."""
     further = {"material": {"density": DENSITY, "young": YOUNG, "poisson": POISSON}, "friction": 0.0, "threads": 1} | further
     gap = 1e-3 * RADIUS
     if partner == "grain":
@@ -99,7 +99,7 @@ def test_restitution_does_not_depend_on_speed_nor_on_the_phase_of_the_touch(make
 
 @pytest.mark.parametrize("restitution", [1.0, 0.8])
 def test_linear_contact_time(make_world, restitution):
-    """``t_c = pi / sqrt(k/m* - (g/2m*)^2)``; a contact that never pulls ends when the force has fallen to zero, with e = 0.8 earlier.
+    """``t_c = pi / sqrt(k/m* - (g/2m*)^2)`` without damping; with it, a contact that never pulls ends when its force is zero.
 
     For the clipped law, ``m* x'' = -k x - g x'`` until the force is zero: at ``t = (pi - atan(2 w c / (w^2 - c^2))) / w`` with
     ``c = g/2m*`` and ``w = sqrt(k/m* - c^2)``.
@@ -142,8 +142,10 @@ def damping_of_linear(restitution):
 
 @pytest.mark.parametrize("partner", ["grain", "floor"])
 def test_viscoelastic_restitution_falls_with_speed(make_world, partner):
-    """Against ``e = 1 - C1 b + C2 b^2``, ``b = 3/2 A (k/m*)^(2/5) v^(1/5)``, ``F = k xi^(3/2) + ...`` of Schwager & Poeschel 1998,
-    https://doi.org/10.1103/PhysRevE.57.650, for weak damping, and an integration with fine steps for strong damping.
+    """Against ``e = 1 - C1 b + C2 b^2``, ``b = 3/2 A (k/m*)^(2/5) v^(1/5)``, for weak damping, and an integration with
+    fine steps for strong damping.
+
+    Source: Schwager & Poeschel 1998, https://doi.org/10.1103/PhysRevE.57.650.
     """
     mass, radius, speed = (MASS / 2.0, RADIUS / 2.0, 2.0) if partner == "grain" else (MASS, RADIUS, 1.0)
     young = YOUNG / (1.0 - POISSON**2) / (2.0 if partner == "grain" else 1.0)

@@ -91,10 +91,8 @@ def test_static_pile_does_not_rattle(make_world):
         world.step(round(0.6 / world.time_step))
         observation = world.observe()
         fastest[law] = max(observation.health.fastest, RADIUS * np.abs(observation.grains.spin).max())
-        top = observation.grains.position[-1]
-        assert top == pytest.approx(
-            [0.0, 0.0, RADIUS * (1.0 + 2.0 * np.sqrt(2.0))], abs=0.05 * RADIUS
-        )  # a fallen pyramid is lower by half a radius
+        top = observation.grains.position[-1]  # of a fallen pyramid, lower by half a radius
+        assert top == pytest.approx([0.0, 0.0, RADIUS * (1.0 + 2.0 * np.sqrt(2.0))], abs=0.05 * RADIUS)
     assert fastest["spring"] < 1e-6
     assert fastest["constant"] > 10.0 * fastest["spring"]
 
