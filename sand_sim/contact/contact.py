@@ -33,6 +33,7 @@ def contact_type(precision: Precision) -> type:
         mass: real  # [kg] effective mass m* = ma mb / (ma + mb)
         patch: real  # [m] radius of the Hertz contact patch, a = sqrt(R* xi), zero across a gap
         inertia: real  # [sqrt(kg m)] sqrt(m* a), shared by the damping of both directions
+        share: real  # [1] time for which the damping of this step stands, over the step
 
     return Contact
 

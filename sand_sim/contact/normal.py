@@ -59,7 +59,7 @@ def build_linear(precision: Precision, types: ContactTypes) -> wp.Function:
 
     @wp.func
     def linear(contact: types.contact, pair: types.pair) -> real:
-        viscous = pair.linear_damping * wp.sqrt(contact.mass) * contact.normal_speed
+        viscous = pair.linear_damping * wp.sqrt(contact.mass) * contact.share * contact.normal_speed
         return wp.where(contact.overlap > real(0.0), wp.max(pair.stiffness * contact.overlap - viscous, real(0.0)), real(0.0))
 
     return linear

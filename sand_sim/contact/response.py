@@ -36,9 +36,34 @@ def build_meeting(precision: Precision) -> wp.Function:
         contact.mass = mass
         contact.patch = wp.sqrt(radius * wp.max(overlap, real(0.0)))
         contact.inertia = wp.sqrt(contact.patch * mass)
+        contact.share = real(1.0)
         return contact
 
     return meeting
+
+
+@cache
+def build_fresh(precision: Precision) -> wp.Function:
+    """Warp function ``(contact, dt) -> contact`` that gives dampers their due in the step in which bodies touch.
+
+    Damping sets in at full strength at touch, which lies anywhere within a step. Its first force therefore stands for the time
+    since touch and half a step on, ``share = xi / |v_n| dt + 1/2``, with the patch it has in the mean over that time; else the
+    restitution would depend on where in a step grains meet (by 0.02 at 25 steps a contact). Elastic forces begin at zero and are
+    left alone, so that elastic contacts stay reversible.
+    """
+    real, contact_struct = precision.real, contact_type(precision)
+
+    @wp.func
+    def fresh(contact: contact_struct, dt: real) -> contact_struct:
+        advance = -contact.normal_speed * dt
+        if contact.overlap < advance:
+            contact.share = contact.overlap / advance + real(0.5)
+            # The mean of xi^(1/4) up to an overlap is that at (4/5)^4 of it.
+            mean = real(256.0) / real(625.0) * contact.share * advance
+            contact.inertia = contact.share * wp.sqrt(contact.mass * wp.sqrt(contact.radius * mean))
+        return contact
+
+    return fresh
 
 
 @cache
@@ -102,11 +127,17 @@ def build_memory_slot(model: ContactModel, precision: Precision, slot: str) -> t
 
 
 @cache
-def build_response(model: ContactModel, precision: Precision) -> wp.Function:
+def build_response(model: ContactModel, precision: Precision, centred: bool) -> wp.Function:
     """Warp function ``(contact, pair, memory, dt) -> (push, drag, moment, memory)`` on body a.
 
     ``push`` [N] acts along the normal and may pull, ``drag`` [N] in the tangent plane at the contact point, ``moment`` [N m] is
-    that of rolling and twisting resistance.
+    that of rolling and twisting resistance; the memory given back is that of now.
+
+    Args:
+        model: laws.
+        precision: number types.
+        centred: velocities are those of now, and memories those of half a step ago (see ``build_onward``); else velocities are
+            those of half a step ago, and memories those of a step ago.
     """
     vec3, real, types = precision.vec3, precision.real, model.types(precision)
     built = {slot: law.build(precision, types) for slot, law in model.laws.items()}
@@ -117,6 +148,7 @@ def build_response(model: ContactModel, precision: Precision) -> wp.Function:
     take_roll, put_roll = build_memory_slot(model, precision, "rolling")
     take_twist, put_twist = build_memory_slot(model, precision, "twisting")
     take_bond, put_bond = build_memory_slot(model, precision, "cohesion")
+    fresh = build_fresh(precision)
 
     @wp.func
     def response(contact: types.contact, pair: types.pair, memory: memory_vector, dt: real):
@@ -126,16 +158,21 @@ def build_response(model: ContactModel, precision: Precision) -> wp.Function:
         after = memory_vector()
         # Where nothing acts across a gap only touching contacts come here.
         if not wp.static(cohesive) or contact.overlap > real(0.0):
+            contact = fresh(contact, dt)
+            # Over this time springs have grown since they were last kept, or since touch.
+            span = dt
+            if wp.static(centred):
+                span = dt * (contact.share - real(0.5))
             push = normal(contact, pair)
             if wp.static(has_tangential):
-                drag, slipped = tangential(contact, pair, push, take_slip(memory), dt)
+                drag, slipped = tangential(contact, pair, push, take_slip(memory), span)
                 after = put_slip(after, slipped)
             if wp.static(has_rolling):
-                turn, rolled = rolling(contact, pair, push, take_roll(memory), dt)
+                turn, rolled = rolling(contact, pair, push, take_roll(memory), span)
                 moment += turn
                 after = put_roll(after, rolled)
             if wp.static(has_twisting):
-                twist, twisted = twisting(contact, pair, push, take_twist(memory), dt)
+                twist, twisted = twisting(contact, pair, push, take_twist(memory), span)
                 moment += twist
                 after = put_twist(after, twisted)
         if wp.static(cohesive):
@@ -145,6 +182,35 @@ def build_response(model: ContactModel, precision: Precision) -> wp.Function:
         return push, drag, moment, after
 
     return response
+
+
+@cache
+def build_onward(model: ContactModel, precision: Precision, centred: bool) -> wp.Function:
+    """Warp function ``(contact, memory, dt) -> memory`` to be kept until the next step.
+
+    With centred velocities springs grow half a step ahead of now: summing them up at half steps is second order, while adding
+    ``v dt`` to the springs of now would lead by half a step, which acts as a damping of ``k dt / 2``.
+    """
+    real, memory_vector = precision.real, memory_type(model, precision)
+    slides, rolls, twists = (centred and bool(model.laws[slot].memory) for slot in ("tangential", "rolling", "twisting"))
+    slip, roll, twist = (model.offset(slot) for slot in ("tangential", "rolling", "twisting"))
+
+    @wp.func
+    def onward(contact: contact_type(precision), memory: memory_vector, dt: real):
+        if contact.overlap > real(0.0):
+            half = real(0.5) * dt
+            spin = wp.dot(contact.turning, contact.normal)
+            rolling = contact.turning - contact.normal * spin
+            for k in range(3):
+                if wp.static(slides):
+                    memory[wp.static(slip) + k] += contact.slip[k] * half
+                if wp.static(rolls):
+                    memory[wp.static(roll) + k] += rolling[k] * half
+            if wp.static(twists):
+                memory[wp.static(twist)] += spin * half
+        return memory
+
+    return onward
 
 
 @cache

@@ -58,10 +58,7 @@ def build_spring(precision: Precision, types: ContactTypes) -> wp.Function:
         inertia = real(7.0) / real(5.0) * contact.mass * contact.least * contact.least
         viscous = rolling * (real(2.0) * real(wp.static(damping)) * wp.sqrt(stiffness * inertia))
         rolled = turned(memory, contact.normal) + rolling * dt
-        moment = -rolled * stiffness - viscous
-        if stiffness > real(0.0):
-            moment, rolled = bounded(moment, viscous, rolled, stiffness, arm * normal_force)
-        return moment, rolled
+        return bounded(rolled, viscous, stiffness, arm * normal_force)
 
     return spring
 
@@ -105,13 +102,10 @@ def build_marshall(precision: Precision, types: ContactTypes) -> wp.Function:
         stiffness = real(8.0) * pair.shear * contact.patch * half
         viscous = pair.shear_damping * contact.inertia * half * rate
         angle = twisted + rate * dt
-        moment = -stiffness * angle - viscous
         bound = real(2.0) / real(3.0) * contact.patch * pair.friction * normal_force
-        if wp.abs(moment) > bound:
-            moment = wp.sign(moment) * bound
-            if stiffness > real(0.0):
-                angle = -(moment + viscous) / stiffness
-        return contact.normal * moment, angle
+        if stiffness * wp.abs(angle) > bound:
+            angle = wp.sign(angle) * bound / stiffness
+        return contact.normal * wp.clamp(-stiffness * angle - viscous, -bound, bound), angle
 
     return marshall
 

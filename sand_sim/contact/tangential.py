@@ -19,18 +19,23 @@ _TURN_SQUARE = 1e-6
 
 
 def build_bounded(precision: Precision) -> wp.Function:
-    """Warp function ``(force, viscous, spring, stiffness, bound) -> (force, spring)``: Coulomb's bound.
+    """Warp function ``(spring, viscous, stiffness, bound) -> (force, spring)``: Coulomb's bound.
 
-    Beyond the bound the contact slides: the force is cut back to it, and the spring to what it still holds.
+    A spring beyond the bound yields to what the bound can hold; then spring and dashpot together are cut back to it. The spring
+    does not take up the dashpot's share: it would turn against the motion while the bound grows, and a sphere that slides through
+    an impact would lose less than ``mu`` times its normal momentum.
     """
     real, vec3 = precision.real, precision.vec3
 
     @wp.func
-    def bounded(force: vec3, viscous: vec3, spring: vec3, stiffness: real, bound: real):
+    def bounded(spring: vec3, viscous: vec3, stiffness: real, bound: real):
+        square = stiffness * stiffness * wp.dot(spring, spring)
+        if square > bound * bound:
+            spring = spring * (bound / wp.sqrt(square))
+        force = -spring * stiffness - viscous
         square = wp.dot(force, force)
         if square > bound * bound:
             force = force * (bound / wp.sqrt(square))
-            spring = -(force + viscous) / stiffness
         return force, spring
 
     return bounded
@@ -79,7 +84,7 @@ def build_linear(precision: Precision, types: ContactTypes) -> wp.Function:
     """Linear tangential spring-dashpot with history, bounded by Coulomb friction.
 
     ``F = -k_s s - 2 z sqrt(k_s m*) v_s`` and ``|F| <= mu F_n``; the spring s is turned with the tangent plane and grows by
-    ``v_s dt``; while sliding it is cut back to what the bound can hold.
+    ``v_s dt``; while sliding it yields to what the bound can hold.
 
     Source: Cundall & Strack 1979, https://doi.org/10.1680/geot.1979.29.1.47; Luding 2008,
     https://doi.org/10.1007/s10035-008-0099-x.
@@ -90,9 +95,8 @@ def build_linear(precision: Precision, types: ContactTypes) -> wp.Function:
     @wp.func
     def linear(contact: types.contact, pair: types.pair, normal_force: real, spring: vec3, dt: real):
         stretched = turned(spring, contact.normal) + contact.slip * dt
-        viscous = contact.slip * (pair.linear_shear_damping * wp.sqrt(contact.mass))
-        force = -stretched * pair.shear_stiffness - viscous
-        return bounded(force, viscous, stretched, pair.shear_stiffness, pair.friction * normal_force)
+        viscous = contact.slip * (pair.linear_shear_damping * wp.sqrt(contact.mass) * contact.share)
+        return bounded(stretched, viscous, pair.shear_stiffness, pair.friction * normal_force)
 
     return linear
 
@@ -119,7 +123,7 @@ def build_mindlin(precision: Precision, types: ContactTypes) -> wp.Function:
     """Mindlin's no-slip tangential stiffness with history, bounded by Coulomb friction.
 
     ``F = -k_t s - 2 z sqrt(k_t m*) v_s`` with ``k_t = 8 G* a`` and ``|F| <= mu F_n``. The spring s is turned with the tangent
-    plane and grows by ``v_s dt``; while sliding it is cut back to what the bound can hold.
+    plane and grows by ``v_s dt``; while sliding it yields to what the bound can hold.
 
     Source: Mindlin & Deresiewicz 1953, in the incremental form of Di Renzo & Di Maio 2004,
     https://doi.org/10.1016/j.ces.2003.09.037. It is not the full load-history theory: the stiffness follows the present overlap.
@@ -132,8 +136,7 @@ def build_mindlin(precision: Precision, types: ContactTypes) -> wp.Function:
         stiffness = real(8.0) * pair.shear * contact.patch
         stretched = turned(spring, contact.normal) + contact.slip * dt
         viscous = contact.slip * (pair.shear_damping * contact.inertia)
-        force = -stretched * stiffness - viscous
-        return bounded(force, viscous, stretched, stiffness, pair.friction * normal_force)
+        return bounded(stretched, viscous, stiffness, pair.friction * normal_force)
 
     return mindlin
 

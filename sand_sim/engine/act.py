@@ -4,8 +4,9 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.response import build_response, build_stored_energy, memory_type
+from sand_sim.contact.response import build_onward, build_response, build_stored_energy, memory_type
 from sand_sim.engine.recipe import Recipe
+from sand_sim.integrator import VERLET
 
 
 @cache
@@ -36,7 +37,9 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
     precision, rotation, history, couples = recipe.precision, recipe.rotation, recipe.history, recipe.contact.couples
     real, vec3, vec4 = precision.real, precision.vec3, precision.vec4
     types, memory_vector = recipe.contact.types(precision), memory_type(recipe.contact, precision)
-    response, stored_energy = build_response(recipe.contact, precision), build_stored_energy(recipe.contact, precision)
+    centred = recipe.integrator == VERLET
+    response, onward = build_response(recipe.contact, precision, centred), build_onward(recipe.contact, precision, centred)
+    stored_energy = build_stored_energy(recipe.contact, precision)
 
     @wp.func
     def act(
@@ -65,10 +68,10 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
         if wp.static(couples):
             moment[contact] = resistance
         if wp.static(measuring):
-            energy[contact] = stored_energy(met, pair, before)
+            energy[contact] = stored_energy(met, pair, after)
         else:
             if wp.static(history):
-                memory[contact] = after
+                memory[contact] = onward(met, after, dt)
             if depth > deepest[lane]:
                 wp.atomic_max(deepest, lane, depth)
 

@@ -34,31 +34,37 @@ def test_stack_of_ten(make_world, precision):
 
 
 def test_bouncing_ball(make_world):
-    """The n-th peak is ``e^(2n) h0``; afterwards the ball lies in its own dent."""
-    radius, height, restitution = 0.005, 0.05, 0.7
+    """The n-th peak is ``e^(2n) h0``, all is over after ``sqrt(2 h0/g) (1+e)/(1-e)``, then the ball lies in its own dent.
+
+    From the third bounce on gravity during the contact tells: peaks are lower by more than 1 %, whatever the time step.
+    """
+    radius, height, restitution, young = 0.005, 0.02, 0.7, 1e8
     world = make_world(
         [[0.0, 0.0, radius + height]],
         radius,
-        material=SAND | {"young": 1e8},
+        material=SAND | {"young": young},
         restitution=restitution,
         friction=0.0,
         gravity=[0.0, 0.0, -9.81],
         boundaries=floor(),
         domain={"low": [-0.1, -0.1, -0.05], "high": [0.1, 0.1, 0.1]},
         precision="single",
-        time_step=2e-6,
+        time_step=2e-6,  # a 25th of the first contact
+        threads=1,
     )
-    every = 100
-    history = record(world, round(0.45 / world.time_step / every), every)
-    z, time = history["position"][:, 0, 2] - radius, history["time"]
     falls = np.sqrt(2.0 * height / 9.81)
-    ends = falls * (1.0 + 2.0 * np.cumsum(restitution ** np.arange(1, 4)))
+    over = falls * (1.0 + restitution) / (1.0 - restitution)
+    every = 200
+    history = record(world, round(1.05 * over / world.time_step / every), every)
+    z, time = history["position"][:, 0, 2] - radius, history["time"]
+    ends = falls * (1.0 + 2.0 * np.cumsum(restitution ** np.arange(1, 3)))
     for n, (begin, end) in enumerate(zip([falls, *ends[:-1]], ends, strict=True), start=1):
         during = (time > begin) & (time < end)
         assert z[during].max() == pytest.approx(restitution ** (2 * n) * height, rel=1e-2)
-    world.step(round(0.5 / world.time_step))
     weight = 2650.0 * 4 / 3 * np.pi * radius**3 * 9.81
-    dent = (3.0 * weight * (1.0 - 0.3**2) / (4.0 * 1e8 * np.sqrt(radius))) ** (2.0 / 3.0)
+    dent = (3.0 * weight * (1.0 - 0.3**2) / (4.0 * young * np.sqrt(radius))) ** (2.0 / 3.0)
+    assert time[z > 0.0][-1] == pytest.approx(over, rel=2e-2)
+    world.step(round(0.1 / world.time_step))
     assert radius - world.observe().grains.position[0, 2] == pytest.approx(dent, rel=1e-3)
 
 
@@ -81,19 +87,24 @@ def momenta(grains, density=2500.0):
     return linear, (np.cross(grains.position, mass * velocity) + turning).sum(axis=0), np.abs(mass * velocity).sum()
 
 
-@pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-11), ("single", 1e-5)])
+@pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-13), ("single", 2e-7)])
 def test_isolated_grains_keep_their_momenta(make_world, precision, tolerance):
+    """To rounding, with friction, and in the middle of contacts too."""
     position, radius, velocity, spin = gas()
     material = {"density": 2500.0, "young": 1e7, "poisson": 0.25}
     domain = {"low": [-0.2] * 3, "high": [0.25] * 3}
     world = make_world(position, radius, velocity=velocity, spin=spin, material=material, domain=domain, precision=precision)
     before, turning_before, scale = momenta(world.observe().grains)
-    world.step(3000)
-    observation = world.observe()
-    after, turning_after, _ = momenta(observation.grains)
+    contacts = []
+    for _ in range(15):
+        world.step(200)
+        observation = world.observe()
+        after, turning_after, _ = momenta(observation.grains)
+        contacts.append(observation.health.contacts)
+        assert np.abs(after - before).max() < tolerance * scale
+        assert np.abs(turning_after - turning_before).max() < tolerance * scale * 0.05
+    assert max(contacts) > 3
     assert observation.health.dissipated > 0.0
-    assert np.abs(after - before).max() < tolerance * scale
-    assert np.abs(turning_after - turning_before).max() < tolerance * scale * 0.05
 
 
 def test_elastic_frictionless_gas_keeps_its_energy(make_world):

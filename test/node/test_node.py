@@ -242,18 +242,34 @@ def test_cloud_rate_and_decimation(client, start_node):
     assert sorted(cloud_to_points(clouds[-1])["id"]) == list(range(0, 32, 4))
 
 
-def test_streaming_in_real_time(client, start_node):
-    start_node(pacing="realtime")
+def test_streaming_in_real_time(client, start_node, tmp_path):
+    """At half speed never ahead of the wall clock, and beside it in at least one of ten windows, however busy the machine is."""
+    soft = {
+        "sand": {"density": 2600.0, "young": 1e5, "poisson": 0.25},
+        "steel": {"density": 7800.0, "young": 1e6, "poisson": 0.3},
+    }
+    (tmp_path / "soft").mkdir()
+    scene = write_small_scene(tmp_path / "soft", materials=soft)
+    factor = 0.5
+    node = start_node(scene=str(scene), pacing="realtime", real_time_factor=factor, threads=1)
     client.connect()
-    client.wait_for(lambda: client.time > 0.1)
-    begin, first = time.monotonic(), client.time
-    for k in range(50):
-        client.send(START - [0.0, 0.0, 0.0005 * k])
-        end = time.monotonic() + 0.02
-        while time.monotonic() < end:
-            client.executor.spin_once(timeout_sec=0.002)
-    assert (client.time - first) / (time.monotonic() - begin) == pytest.approx(1.0, abs=0.25)
-    assert len(client.wrenches) > 20
+    client.wait_for(lambda: client.time > 0.05)
+    world = node.simulation.world
+    start, begin, rates = time.monotonic(), world.time, []
+    while not rates or (len(rates) < 10 and abs(rates[-1] / factor - 1.0) > 0.2):
+        opened, first = time.monotonic(), world.time
+        for k in range(40):
+            client.send(START - [0.0, 0.0, 0.0005 * k])
+            end = time.monotonic() + 0.02
+            while time.monotonic() < end:
+                client.executor.spin_once(timeout_sec=0.002)
+            simulated = world.time - begin
+            # Arrears of 0.2 s are caught up with, and a frame of 0.02 s is done at once.
+            assert simulated < factor * (time.monotonic() - start + 0.2) + 0.021
+        rates.append((world.time - first) / (time.monotonic() - opened))
+    assert rates[-1] / factor == pytest.approx(1.0, abs=0.2), f"simulated over wall seconds: {rates}"
+    heard = len(client.wrenches)
+    client.wait_for(lambda: len(client.wrenches) > heard + 10)
 
 
 def test_parameters_are_described_and_ranged(ros, start_node):

@@ -27,7 +27,8 @@ class ReferenceDem:
         self.r, self.dt, self.g = np.asarray(radius, float), dt, np.asarray(gravity, float)
         self.m = density * 4.0 / 3.0 * np.pi * self.r**3
         self.inertia = 0.4 * self.m * self.r**2
-        self.laws, self.pair, self.planes, self.integrator = laws, pair | {"dt": dt}, planes, integrator
+        self.laws, self.planes, self.integrator = laws, planes, integrator
+        self.pair = pair | {"dt": dt, "centred": integrator == "velocity_verlet"}
         self.memories = defaultdict(dict)
         self.half = None  # velocity and spin half a step ago
 
