@@ -116,7 +116,8 @@ class DemArrays:
             wanted = int(contacts.wanted.numpy()[0])
             if wanted > contacts.pairs.capacity:
                 contacts.make_room(int(_ROOM_TO_SPARE * wanted))
-        self.met = SortedItems.allocate(self.grains.capacity, self.pair_list.pairs.capacity, self.lanes, self.device)
+        if self.met.order.shape[0] < self.pair_list.pairs.capacity:  # else it still holds the pairs while another list grows
+            self.met = SortedItems.allocate(self.grains.capacity, self.pair_list.pairs.capacity, self.lanes, self.device)
         precision = self.recipe.precision
         self.energy = {
             name: wp.zeros(c.pairs.capacity, dtype=precision.real, device=self.device) for name, c in self.lists.items()
