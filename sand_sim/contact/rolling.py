@@ -60,7 +60,7 @@ def build_spring(precision: Precision, types: ContactTypes) -> wp.Function:
         rolled = turned(memory, contact.normal) + rolling * dt
         moment = -rolled * stiffness - viscous
         if stiffness > real(0.0):
-            moment, rolled = bounded(moment, viscous, rolled, stiffness, arm * normal_force)
+            moment, rolled = bounded(moment, rolled, stiffness, arm * normal_force)
         return moment, rolled
 
     return spring

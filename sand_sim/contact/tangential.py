@@ -19,18 +19,19 @@ _TURN_SQUARE = 1e-6
 
 
 def build_bounded(precision: Precision) -> wp.Function:
-    """Warp function ``(force, viscous, spring, stiffness, bound) -> (force, spring)``: Coulomb's bound.
+    """Warp function ``(force, spring, stiffness, bound) -> (force, spring)``: Coulomb's bound.
 
-    Beyond the bound the contact slides: the force is cut back to it, and the spring to what it still holds.
+    Beyond the bound the contact slides: the force is cut back to it, and the spring to what holds it alone; a
+    dashpot's share kept in the spring would come back as a push along the slip where the stiffness changes.
     """
     real, vec3 = precision.real, precision.vec3
 
     @wp.func
-    def bounded(force: vec3, viscous: vec3, spring: vec3, stiffness: real, bound: real):
+    def bounded(force: vec3, spring: vec3, stiffness: real, bound: real):
         square = wp.dot(force, force)
         if square > bound * bound:
             force = force * (bound / wp.sqrt(square))
-            spring = -(force + viscous) / stiffness
+            spring = -force / stiffness
         return force, spring
 
     return bounded
@@ -92,7 +93,7 @@ def build_linear(precision: Precision, types: ContactTypes) -> wp.Function:
         stretched = turned(spring, contact.normal) + contact.slip * dt
         viscous = contact.slip * (pair.linear_shear_damping * wp.sqrt(contact.mass))
         force = -stretched * pair.shear_stiffness - viscous
-        return bounded(force, viscous, stretched, pair.shear_stiffness, pair.friction * normal_force)
+        return bounded(force, stretched, pair.shear_stiffness, pair.friction * normal_force)
 
     return linear
 
@@ -133,7 +134,7 @@ def build_mindlin(precision: Precision, types: ContactTypes) -> wp.Function:
         stretched = turned(spring, contact.normal) + contact.slip * dt
         viscous = contact.slip * (pair.shear_damping * contact.inertia)
         force = -stretched * stiffness - viscous
-        return bounded(force, viscous, stretched, stiffness, pair.friction * normal_force)
+        return bounded(force, stretched, stiffness, pair.friction * normal_force)
 
     return mindlin
 

@@ -48,7 +48,7 @@ def bounded(c, p, memory, push, stiffness, ratio):
     size, bound = np.linalg.norm(drag), p["friction"] * push
     if size > bound:
         drag *= bound / size
-        spring = -(drag + viscosity * slip) / stiffness
+        spring = -drag / stiffness
     memory["spring"] = spring
     return drag
 
@@ -91,7 +91,7 @@ def rolling_spring(c, p, memory, push):
     size, bound = np.linalg.norm(moment), arm * push
     if size > bound:
         moment *= bound / size
-        angle = -(moment + damping * rolling) / stiffness
+        angle = -moment / stiffness
     memory["rolled"] = angle
     return moment
 
