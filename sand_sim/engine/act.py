@@ -4,8 +4,9 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.response import build_response, build_stored_energy, memory_type
+from sand_sim.contact.response import build_meeting, build_response, build_stored_energy, memory_type
 from sand_sim.engine.recipe import Recipe
+from sand_sim.integrator import VERLET
 
 
 @cache
@@ -36,6 +37,7 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
     precision, rotation, history, couples = recipe.precision, recipe.rotation, recipe.history, recipe.contact.couples
     real, vec3, vec4 = precision.real, precision.vec3, precision.vec4
     types, memory_vector = recipe.contact.types(precision), memory_type(recipe.contact, precision)
+    meeting, lagging = build_meeting(precision), recipe.integrator != VERLET
     response, stored_energy = build_response(recipe.contact, precision), build_stored_energy(recipe.contact, precision)
 
     @wp.func
@@ -64,13 +66,17 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
             couple[contact] = vec4(turn[0], turn[1], turn[2], arm_loss)
         if wp.static(couples):
             moment[contact] = resistance
+        if depth > deepest[lane]:
+            wp.atomic_max(deepest, lane, depth)
         if wp.static(measuring):
-            energy[contact] = stored_energy(met, pair, before)
-        else:
-            if wp.static(history):
-                memory[contact] = after
-            if depth > deepest[lane]:
-                wp.atomic_max(deepest, lane, depth)
+            stored_in = met
+            if wp.static(lagging):
+                # Velocities are those of the middle of the last step; energies add up if the overlap is taken there, too.
+                overlap = met.overlap + real(0.5) * dt * met.normal_speed
+                stored_in = meeting(met.normal, overlap, met.slip, met.turning, met.radius, met.least, met.mass)
+            energy[contact] = stored_energy(stored_in, pair, before)
+        elif wp.static(history):
+            memory[contact] = after
 
     @wp.func
     def release(

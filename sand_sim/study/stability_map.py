@@ -7,7 +7,7 @@ import numpy as np
 
 from sand_sim.contact.damping import damping_ratio
 from sand_sim.engine.explicit_dem import UnstableError
-from sand_sim.scene.stable_step import grain_share, network_step
+from sand_sim.scene.stable_step import grain_share, stable_step
 from sand_sim.study.bed_cases import confined_scene
 from sand_sim.study.bench import GRAIN, Bench, plane
 from sand_sim.study.closed_forms import impact_limit, impact_overlap, impact_time, plane_modulus, sphere_mass
@@ -116,7 +116,8 @@ def _bed(bench: Bench, young: float, ratio: float):
     parsed = confined_scene(bench, young, _RESTITUTION, 0.5, _OVERLAP)
     mass = float(sphere_mass(_RADIUS, GRAIN["density"]))
     stiffness = plane_modulus(young, GRAIN["poisson"]) * np.sqrt(0.5 * _RADIUS * _OVERLAP * _RADIUS)
-    damping = damping_ratio(_RESTITUTION, 1.5)
-    limit = network_step(stiffness, mass, 0.5 * mass, damping, grain_share(rotation=True))
+    damping = 2.0 * damping_ratio(_RESTITUTION, 1.5) * np.sqrt(0.5 * stiffness * mass)
+    share = grain_share(rotation=True)
+    limit = stable_step(share * stiffness / mass, share * damping / mass)
     steps = int(np.clip(100.0 / ratio, 200, 2000))
     return parsed, limit, steps, lambda start, end: end.health.kinetic / start.health.kinetic
