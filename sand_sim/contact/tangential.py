@@ -21,8 +21,8 @@ _TURN_SQUARE = 1e-6
 def build_bounded(precision: Precision) -> wp.Function:
     """Warp function ``(force, spring, stiffness, bound) -> (force, spring)``: Coulomb's bound.
 
-    Beyond the bound the contact slides: the force is cut back to it, and the spring to what holds it alone; a
-    dashpot's share kept in the spring would come back as a push along the slip where the stiffness changes.
+    Beyond the bound the contact slides: the force is cut back to it, and the spring to the length at which it alone would reach
+    it. A dashpot's share in the spring would come back as a push along the slip where the stiffness changes.
     """
     real, vec3 = precision.real, precision.vec3
 
@@ -31,7 +31,9 @@ def build_bounded(precision: Precision) -> wp.Function:
         square = wp.dot(force, force)
         if square > bound * bound:
             force = force * (bound / wp.sqrt(square))
-            spring = -force / stiffness
+            length = wp.length(spring)
+            if length * stiffness > bound:
+                spring = spring * (bound / (length * stiffness))
         return force, spring
 
     return bounded

@@ -2,8 +2,6 @@
 
 import numpy as np
 
-from sand_sim.scene.stable_step import stable_step
-
 
 def sphere_mass(radius, density: float):
     """``4/3 pi r^3 rho`` [kg]."""
@@ -30,11 +28,11 @@ def static_overlap(force: float, radius: float, modulus: float) -> float:
     return float((0.75 * force / (modulus * np.sqrt(radius))) ** (2.0 / 3.0))
 
 
-def impact_limit(mass: float, radius: float, modulus: float, speed: float, damping_ratio: float = 0.0) -> float:
+def impact_limit(mass: float, radius: float, modulus: float, speed: float) -> float:
     """Largest stable step at the deepest point of an elastic impact [s].
 
-    There the tangent stiffness is ``k = 2 E* sqrt(R* d_max)``, and with ``w = sqrt(k/m*) = 1.369 v/d_max`` the limit without
-    damping, ``2/w``, is 0.497 of the impact's duration; see ``scene/stable_step.py``.
+    There the tangent stiffness is ``k = 2 E* sqrt(R* d_max)``, and with ``w = sqrt(k/m*) = 1.369 v/d_max`` the limit ``2/w`` is
+    0.497 of the impact's duration; see ``scene/stable_step.py``.
     """
     stiffness = 2.0 * modulus * np.sqrt(radius * impact_overlap(mass, radius, modulus, speed))
-    return stable_step(stiffness / mass, 2.0 * damping_ratio * float(np.sqrt(stiffness / mass)))
+    return float(2.0 / np.sqrt(stiffness / mass))

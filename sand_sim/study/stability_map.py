@@ -7,6 +7,7 @@ import numpy as np
 
 from sand_sim.contact.damping import damping_ratio
 from sand_sim.engine.explicit_dem import UnstableError
+from sand_sim.integrator import VERLET
 from sand_sim.scene.stable_step import grain_share, stable_step
 from sand_sim.study.bed_cases import confined_scene
 from sand_sim.study.bench import GRAIN, Bench, plane
@@ -117,7 +118,7 @@ def _bed(bench: Bench, young: float, ratio: float):
     mass = float(sphere_mass(_RADIUS, GRAIN["density"]))
     stiffness = plane_modulus(young, GRAIN["poisson"]) * np.sqrt(0.5 * _RADIUS * _OVERLAP * _RADIUS)
     damping = 2.0 * damping_ratio(_RESTITUTION, 1.5) * np.sqrt(0.5 * stiffness * mass)
-    share = grain_share(rotation=True)
-    limit = stable_step(share * stiffness / mass, share * damping / mass)
+    share = grain_share(rotation=True, contacts=12.0)
+    limit = stable_step(share * stiffness / mass, share * damping / mass, VERLET)
     steps = int(np.clip(100.0 / ratio, 200, 2000))
     return parsed, limit, steps, lambda start, end: end.health.kinetic / start.health.kinetic

@@ -48,7 +48,7 @@ def bounded(c, p, memory, push, stiffness, ratio):
     size, bound = np.linalg.norm(drag), p["friction"] * push
     if size > bound:
         drag *= bound / size
-        spring = -drag / stiffness
+        spring *= min(1.0, bound / (stiffness * np.linalg.norm(spring)))
     memory["spring"] = spring
     return drag
 
@@ -91,7 +91,7 @@ def rolling_spring(c, p, memory, push):
     size, bound = np.linalg.norm(moment), arm * push
     if size > bound:
         moment *= bound / size
-        angle = -moment / stiffness
+        angle *= min(1.0, bound / (stiffness * np.linalg.norm(angle)))
     memory["rolled"] = angle
     return moment
 
