@@ -201,10 +201,11 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
 
             step = velocity * (dt / quantum) + remainder[i]
             jump = vec3(wp.rint(step[0]), wp.rint(step[1]), wp.rint(step[2]))
-            far = wp.max(wp.max(wp.abs(jump[0]), wp.abs(jump[1])), wp.abs(jump[2]))
-            if not (far <= real(0.5) * real(here[3])):
+            # A square, because a maximum loses what is not a number.
+            square = wp.dot(jump, jump)
+            if not (square <= real(0.25) * real(here[3]) * real(here[3])):
                 bit = int(wp.static(FAULT_NOT_FINITE))
-                if wp.isfinite(far):
+                if wp.isfinite(square):
                     bit = int(wp.static(FAULT_TOO_FAST))
                 fault[0] = fault[0] | bit
                 continue
