@@ -331,7 +331,7 @@ def test_a_run_that_blows_up_stops_and_comes_back(client, start_node):
     assert message.startswith("stepping has stopped: blown up at t = ")
     assert "s would be safe" in message
     stopped = node.simulation.world.time
-    assert 0.03 < stopped < 0.4
+    assert 0.0 < stopped < 0.4
 
     late = Client()  # comes after the fault, and still sees the last good state
     late.wait_for(lambda: late.clouds and late.wrenches and late.clocks)
