@@ -1,7 +1,7 @@
 """From a checked Scene to the arrays of a solver: the only place that knows both."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from sand_sim.grain_table import GrainTable
 from sand_sim.precision import PRECISIONS, Precision
 from sand_sim.scene.filling import fill_grains
 from sand_sim.scene.pairing import pair_numbers
+from sand_sim.scene.stable_step import DEEP
 from sand_sim.scene.time_step import TimeStep, choose_time_step, fastest_speed
 from sand_sim.scene.types import Scene, SceneError, Tool
 from sand_sim.scene.walls import Wall, walls_of
@@ -29,6 +30,7 @@ from sand_sim.scene.walls import Wall, walls_of
 _SKIN = 0.25  # of the mean grain radius
 _SPHERES_PER_THREAD = 1000
 _MARGIN = 0.25  # of the scene's largest edge, free around everything in it
+_FLOOR = 0.05  # a plane whose normal points up by at least this much is a floor
 
 Progress = Callable[[str, float], None]
 
@@ -64,6 +66,7 @@ class Assembly:
         walls: analytic surfaces.
         tools: in the order of the scene.
         bodies: in the order of the scene.
+        smallest: smallest grain radius of each grain material [m].
         time_step: chosen, with its reasons.
         frame_steps: steps per frame.
         lattice: the domain.
@@ -77,6 +80,7 @@ class Assembly:
     walls: list[Wall]
     tools: list[ToolModel]
     bodies: list[BodyModel]
+    smallest: dict[str, float]
     time_step: TimeStep
     frame_steps: int
     lattice: Lattice
@@ -107,6 +111,12 @@ class Assembly:
         np.maximum.at(extent, table.body[~table.lone], (np.linalg.norm(table.offset, axis=1) + table.radius)[~table.lone])
         return extent
 
+    def safe_step(self, speed: float, depth: float) -> float:
+        """The step [s] that would be safe at a top speed [m/s] and an overlap over radius [1]."""
+        free = replace(self.scene, solver=replace(self.scene.solver, time_step=None))
+        spacings = [tool.body.spacing for tool in self.tools]
+        return choose_time_step(free, self.smallest, max(speed, self.time_step.speed), spacings, max(depth, DEEP)).safe
+
 
 def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> Assembly:
     """Make grains, walls, tools and the solver of a scene.
@@ -128,7 +138,8 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     bodies = [model_body(body, scene, progress) for body in scene.bodies]
     table = GrainTable.join([*fills, *(body.table(order.index(body.body.material)) for body in bodies)])
     device = _open_device(scene, len(table))
-    time_step, frame_steps = _time_step(scene, table, order)
+    smallest = {order[k]: float(table.radius[table.material == k].min()) for k in np.unique(table.material)}
+    time_step, frame_steps = _time_step(scene, table, smallest, walls, tools)
     precision = PRECISIONS[scene.solver.precision]
     lattice = _lattice(scene, table, walls, tools, precision)
     recipe = Recipe(
@@ -151,7 +162,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         device.name,
     )
     numbers, solver = [fill.grains for fill in fills], ExplicitDem(arrays, device)
-    return Assembly(scene, numbers, table, walls, tools, bodies, time_step, frame_steps, lattice, recipe, solver)
+    return Assembly(scene, numbers, table, walls, tools, bodies, smallest, time_step, frame_steps, lattice, recipe, solver)
 
 
 def _open_device(scene: Scene, spheres: int):
@@ -183,19 +194,29 @@ def _material_order(scene: Scene) -> list[str]:
     return sorted((m.name for m in scene.materials), key=lambda name: name not in grains)
 
 
-def _time_step(scene: Scene, table: GrainTable, order: list[str]) -> tuple[TimeStep, int]:
+def _time_step(
+    scene: Scene, table: GrainTable, smallest: dict[str, float], walls: list[Wall], tools: list[ToolModel]
+) -> tuple[TimeStep, int]:
     """The step, shortened so that a whole number of steps makes a frame unless the scene gives it, and that number."""
-    down = np.asarray(scene.gravity) / (np.linalg.norm(scene.gravity) or 1.0)
-    depth = table.position @ down
     given = float(np.linalg.norm(table.velocity, axis=1).max())
-    speed = fastest_speed(scene, float(np.ptp(depth)), 0.0, given)
-    smallest = {order[k]: float(table.radius[table.material == k].min()) for k in np.unique(table.material)}
-    chosen = choose_time_step(scene, smallest, speed)
+    speed = fastest_speed(scene, _fall_height(scene, table, walls), given)
+    chosen = choose_time_step(scene, smallest, speed, [tool.body.spacing for tool in tools])
     frame = 1.0 / scene.frame_rate
     if scene.solver.time_step is not None:
         return chosen, max(1, round(frame / chosen.value))
     steps = int(np.ceil(frame / chosen.value))
-    return TimeStep(frame / steps, chosen.safe, chosen.contact, chosen.rayleigh, chosen.speed, chosen.reason), steps
+    return replace(chosen, value=frame / steps), steps
+
+
+def _fall_height(scene: Scene, table: GrainTable, walls: list[Wall]) -> float:
+    """How far a grain can fall at most, past the lowest grain or on to a floor [m]."""
+    down = np.asarray(scene.gravity) / (np.linalg.norm(scene.gravity) or 1.0)
+    heights = [float(np.ptp(table.position @ down))]
+    for wall in walls:
+        steepness = -float(wall.direction @ down)
+        if wall.kind == "plane" and steepness > _FLOOR:
+            heights.append(float((wall.distance(table.position) - table.radius).max()) / steepness)
+    return max(heights)
 
 
 def _lattice(scene: Scene, table: GrainTable, walls: list[Wall], tools: list[ToolModel], precision: Precision) -> Lattice:
@@ -209,6 +230,9 @@ def _lattice(scene: Scene, table: GrainTable, walls: list[Wall], tools: list[Too
     for boundary in scene.boundaries:
         if boundary.kind == "box":
             corners.append(np.array([boundary.low, boundary.high]))
+    for wall in walls:
+        if wall.kind == "plane":  # where grains would hit it
+            corners.append(table.position - wall.distance(table.position)[:, None] * wall.direction)
     for tool in tools:
         poses = [tool.tool.pose, *(waypoint.pose for waypoint in tool.tool.trajectory)]
         stops = np.array([pose.position for pose in poses])

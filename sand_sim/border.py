@@ -146,6 +146,7 @@ class Health:
         contacts: contacts under load.
         retired: grains that have left the domain.
         doubts: why the run should not be trusted, empty if nothing speaks against it.
+        gained: energy that appeared from nowhere since the start, by which ``dissipated`` has fallen from its peak [J].
     """
 
     time_step: float
@@ -160,6 +161,7 @@ class Health:
     contacts: int
     retired: int
     doubts: tuple[str, ...]
+    gained: float = 0.0
 
 
 @dataclass(frozen=True)

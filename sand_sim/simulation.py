@@ -16,6 +16,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 
 from sand_sim.border import CommandError, Observation, ToolPose
+from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.world import World
 
 PACINGS = ("realtime", "fast", "lockstep")
@@ -32,10 +33,11 @@ class Simulation:
         pacing: one of ``PACINGS``.
         real_time_factor: simulated over wall seconds in ``realtime``.
         on_frame: called in the stepping thread with each observation.
-        on_fault: called in the stepping thread with the error that ended it.
+        on_fault: called in the stepping thread with the error that stopped it; after ``UnstableError`` a reset brings it back.
         on_reject: called with the error for each rejected command.
 
     Attributes:
+        fault: the error that has stopped the stepping, None while all is well.
         rejected: number of rejected commands by reason.
         limited: number of poses that were reached later than asked to keep to ``max_speed``.
         last_rejection: message of the last rejected command.
@@ -51,6 +53,7 @@ class Simulation:
         on_reject: Callable[[CommandError], None] = lambda error: None,
     ):
         self.world, self.pacing, self.real_time_factor = world, pacing, real_time_factor
+        self.fault: Exception | None = None
         self.rejected: Counter[str] = Counter()
         self.limited = 0
         self.last_rejection = ""
@@ -119,6 +122,8 @@ class Simulation:
     def _request(self, what: str) -> Future:
         future: Future = Future()
         with self._wake:
+            if self._stopping:
+                future.cancel()
             self._requests.append((what, future))
             self._wake.notify_all()
         return future
@@ -127,19 +132,24 @@ class Simulation:
         try:
             self._on_frame(self.world.observe())
             while not self._stopping:
-                self._take_in()
-                end = self._allowed_until()
-                if end > self.world.time + 0.5 * self.world.time_step:
-                    self._advance(min(end, self._frame_end))
-                else:
-                    with self._wake:
-                        if not (self._inbox or self._requests or self._stopping):
-                            self._wake.wait(_NAP if self.pacing == "realtime" else None)
+                try:
+                    self._take_in()
+                    end = self._allowed_until()
+                    if end > self.world.time + 0.5 * self.world.time_step:
+                        self._advance(min(end, self._frame_end))
+                        continue
+                except UnstableError as error:
+                    self._fail(error)
+                with self._wake:
+                    if not (self._inbox or self._requests or self._stopping):
+                        self._wake.wait(_NAP if self.pacing == "realtime" else None)
         except Exception as error:
-            self._on_fault(error)
+            self._fail(error)
         finally:
-            for _, future in self._requests:
-                future.cancel()
+            with self._wake:
+                self._stopping = True
+                for _, future in self._requests:
+                    future.cancel()
 
     def _take_in(self) -> None:
         """Carry out what has come in from other threads."""
@@ -149,6 +159,8 @@ class Simulation:
             self._requests.clear()
         for command in commands:
             try:
+                if self.fault is not None:
+                    raise CommandError("stopped", f"tool '{command.tool}': stepping has stopped, reset to go on")
                 self._accept(self.world.check(command))
             except CommandError as error:
                 self.reject(error)
@@ -157,13 +169,23 @@ class Simulation:
                 if what == "reset":
                     self._reset()
                     self._on_frame(self.world.observe())
+                elif self.fault is not None:
+                    raise self.fault
                 else:
                     self._frame_end = self.world.time + self.frame
                     self._advance(self._frame_end)
                 future.set_result(None)
+            except UnstableError as error:
+                self._fail(error)
+                future.set_exception(error)
             except Exception as error:
                 future.set_exception(error)
                 raise
+
+    def _fail(self, error: Exception) -> None:
+        if self.fault is not error:
+            self.fault = error
+            self._on_fault(error)
 
     def _accept(self, command: ToolPose) -> None:
         course, now = self._courses[command.tool], self.world.time
@@ -190,7 +212,7 @@ class Simulation:
 
     def _allowed_until(self) -> float:
         """Simulated time up to which stepping is allowed now."""
-        if self._paused:
+        if self._paused or self.fault is not None:
             return 0.0
         if self.pacing == "fast":
             return float("inf")
@@ -224,6 +246,7 @@ class Simulation:
 
     def _reset(self) -> None:
         self.world.reset()
+        self.fault = None
         for course in self._courses.values():
             course.clear()
         self._last_command.clear()

@@ -3,27 +3,34 @@
 from dataclasses import replace
 
 from sand_sim.border import Health
+from sand_sim.scene.stable_step import DEEP
 
-# Overlap over radius beyond which Hertz's assumption of a small contact patch fails: its radius is 0.22 of the grain's there.
-DEEP = 0.1
 GAINED = 0.01  # share of the energy handled that may appear from nowhere
+HASTY = 2.0  # times the step that the present top speed asks for
+BLOWN_UP = 0.5  # share beyond which the run is stopped
 
 
-def find_doubts(health: Health, expected_speed: float) -> Health:
+def find_doubts(health: Health, safe_now: float, beforehand: tuple[str, ...] = ()) -> Health:
     """Fill in ``doubts``.
 
     Args:
         health: indicators.
-        expected_speed: fastest speed the time step was chosen for [m/s].
+        safe_now: time step that would be chosen for the present top speed, infinite where that is no more than expected [s].
+        beforehand: doubts that were there before the first step.
     """
-    doubts = []
+    doubts = list(beforehand)
     if health.step_ratio > 1.0001:
         doubts.append(f"time step is {health.step_ratio:.2g} times the safe one")
     if health.deepest > DEEP:
         doubts.append(f"overlap reached {100.0 * health.deepest:.1f} % of a radius; stiffen the material or slow the tool")
-    if health.fastest > 2.0 * expected_speed:
-        doubts.append(f"grains move at {health.fastest:.3g} m/s, the time step expects {expected_speed:.3g}")
-    handled = health.kinetic + abs(health.potential) + health.elastic + abs(health.tool_work)
-    if -health.dissipated > GAINED * handled:
-        doubts.append(f"{-health.dissipated:.3g} J appeared from nowhere; take a smaller time step")
+    if health.time_step > HASTY * safe_now:
+        doubts.append(f"grains move at {health.fastest:.3g} m/s, which asks for a time step of {safe_now:.2g} s")
+    if gained_share(health) > GAINED:
+        doubts.append(f"{health.gained:.3g} J appeared from nowhere; take a smaller time step")
     return replace(health, doubts=tuple(doubts))
+
+
+def gained_share(health: Health) -> float:
+    """Energy that appeared from nowhere over all energy handled so far [1]."""
+    handled = health.kinetic + abs(health.potential) + health.elastic + abs(health.tool_work)
+    return health.gained / handled if handled > 0.0 else 0.0

@@ -1,18 +1,33 @@
 """A running world: commands in, steps, observations out."""
 
+from dataclasses import astuple
+
 import numpy as np
 
 from sand_sim import rotation
 from sand_sim.assemble import Assembly, Progress, ToolModel, assemble
-from sand_sim.border import CommandError, Observation, ToolPose
+from sand_sim.beforehand import find_coarseness, find_fine_tools, find_overlap
+from sand_sim.border import CommandError, Health, Observation, ToolPose
+from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.engine.tools import ToolTrack
 from sand_sim.integrator import VERLET
-from sand_sim.observing import observe_bodies, observe_grains, observe_health, observe_spheres, observe_tools, observe_walls
-from sand_sim.scene.types import Scene
+from sand_sim.observing import (
+    StartEnergy,
+    observe_bodies,
+    observe_grains,
+    observe_health,
+    observe_spheres,
+    observe_tools,
+    observe_walls,
+    start_energy,
+)
+from sand_sim.scene.types import Scene, SceneError
 from sand_sim.track import Track
+from sand_sim.trust import BLOWN_UP, GAINED, gained_share
 
 _SETTLE_CHUNKS = 50
 _SPEED_TOLERANCE = 1.02
+_FEWEST_BETWEEN = 100  # steps between two states that are kept, so that keeping them stays below 3 % of the time
 
 
 class World:
@@ -23,7 +38,7 @@ class World:
         progress: called with the name of a stage of the preparation and the share of it that is done, 0 to 1.
 
     Raises:
-        SceneError: if the scene cannot be made into a world.
+        SceneError: if the scene cannot be made into a world, or blows up while it settles.
     """
 
     def __init__(self, scene: Scene, progress: Progress = lambda stage, share: None):
@@ -32,16 +47,16 @@ class World:
         self._solver = self.assembly.solver
         self._tool_index = {tool.name: k for k, tool in enumerate(scene.tools)}
         self._set_tracks([Track.rest(tool.pose) for tool in scene.tools])
+        self._solver.begin()
+        self._beforehand = find_overlap(self.assembly) + find_fine_tools(self.assembly) + find_coarseness(self.assembly)
         self._settle(progress)
         self._strike_off()
         self._solver.begin()
-        sums = self._solver.measure()
-        self._grains_at_start = len(observe_grains(self.assembly))
-        self._start_height = sums.height
-        self._start_energy = sums.translation + sums.rotation + sums.height + sums.elastic
+        self._start = start_energy(self.assembly)
         tools = self._solver.arrays.tools
         self._observed_steps, self._observed_wrench = 0, tools.wrench.numpy().copy() if tools else None
         self._initial = self.save()
+        self.reset()
 
     @property
     def time(self) -> float:
@@ -123,19 +138,30 @@ class World:
     def step(self, steps: int = 1) -> None:
         """Advance by a number of time steps.
 
+        Once a frame, and whenever it is observed, the state is kept if energy is in order.
+
         Raises:
-            UnstableError: if a velocity is no longer finite.
+            UnstableError: if the run has blown up; the world is then back in the last good state that was kept.
         """
-        self._solver.run(steps)
+        if self._measured and self._measured[0] == self._solver.steps_done:
+            self._keep()
+        every = max(self.frame_steps, _FEWEST_BETWEEN)
+        while steps > 0:
+            part = min(steps, every)
+            try:
+                self._solver.run(part)
+            except UnstableError as error:
+                raise self._go_back(str(error)) from None
+            if self._solver.steps_done >= self._kept_steps + every:
+                self._keep()
+            steps -= part
 
     def observe(self) -> Observation:
         """What the world shows now; forces on tools are means since the last observation."""
-        steps, sums = self._solver.steps_done, self._solver.measure()
+        steps, health = self._solver.steps_done, self._health()
         spheres = observe_spheres(self.assembly)
         cloud = observe_grains(self.assembly, spheres)
         reports = observe_tools(self.assembly, self._tracks, cloud, self.time, self._mean_wrenches(steps))
-        retired = self._grains_at_start - len(cloud)
-        health = observe_health(self.assembly, sums, self._start_energy, self._start_height, retired)
         bodies = observe_bodies(self.assembly, cloud)
         return Observation(self.time, steps, cloud, reports, observe_walls(self.assembly), health, bodies, spheres)
 
@@ -165,7 +191,7 @@ class World:
         state = self._solver.take_state()
         for name in Track.__dataclass_fields__:
             state[f"track.{name}"] = np.array([getattr(track, name) for track in self._tracks])
-        state["start"] = np.array([self._start_energy, self._start_height])
+        state["start"] = np.array(astuple(self._start))
         state["observed_steps"] = np.array(self._observed_steps)
         if self._observed_wrench is not None:
             state["observed_wrench"] = self._observed_wrench
@@ -176,8 +202,41 @@ class World:
         self._solver.put_state(state)
         columns = [state[f"track.{name}"] for name in Track.__dataclass_fields__]
         self._tracks = [Track(*values) for values in zip(*columns, strict=True)]
-        self._start_energy, self._start_height = (float(value) for value in state["start"])
+        self._start = StartEnergy(*(float(value) for value in state["start"]))
         self._observed_steps, self._observed_wrench = int(state["observed_steps"]), state.get("observed_wrench")
+        self._measured: tuple[int, Health] | None = None
+        self._good, self._good_health, self._kept_steps = state, self._health(), self._solver.steps_done
+
+    def _health(self) -> Health:
+        """Error indicators, measured once a step even where a state is both kept and observed."""
+        steps = self._solver.steps_done
+        if self._measured is None or self._measured[0] != steps:
+            self._measured = (steps, observe_health(self.assembly, self._start, self._beforehand))
+        return self._measured[1]
+
+    def _keep(self) -> None:
+        """Keep the present state to fall back on, unless energy has come from nowhere.
+
+        Raises:
+            UnstableError: if most of the energy there is came from nowhere.
+        """
+        health = self._health()
+        if not gained_share(health) < BLOWN_UP:
+            raise self._go_back(f"{health.gained:.3g} J, most of the energy there is, appeared from nowhere")
+        if gained_share(health) < GAINED and self._kept_steps != self._solver.steps_done:
+            self._good, self._good_health = self.save(), health
+            self._kept_steps = self._solver.steps_done
+
+    def _go_back(self, cause: str) -> UnstableError:
+        """Restore the last good state; the error to raise for what came after it."""
+        blown = self.time
+        self.restore(self._good)
+        safe = self.assembly.safe_step(self._good_health.fastest, self._good_health.deepest)
+        remedy = f"a time step of {0.995 * safe:.3g} s would be safe, it is {self.time_step:.3g} s"  # not more when rounded
+        if self.time_step < 1.01 * safe:
+            doubts = "; ".join(self._good_health.doubts) or "look for bodies that overlap or are too fast"
+            remedy = f"the time step of {self.time_step:.2g} s is not at fault: {doubts}"
+        return UnstableError(f"blown up at t = {blown:.6g} s: {cause}; kept is the state at t = {self.time:.6g} s; {remedy}")
 
     def _set_tracks(self, tracks: list[Track]) -> None:
         self._tracks = tracks
@@ -197,7 +256,11 @@ class World:
             return
         chunk = max(1, round(settle.time / _SETTLE_CHUNKS / self.time_step))
         for done in range(_SETTLE_CHUNKS):
-            self._solver.run(chunk)
+            try:
+                self._solver.run(chunk)
+            except UnstableError as error:
+                why = "; ".join(self._beforehand) or f"try a smaller time step than {self.time_step:.2g} s"
+                raise SceneError(f"settle: the bed blows up while it settles: {error}; {why}") from None
             self._solver.measure()
             cloud = observe_grains(self.assembly)
             speed = np.sqrt(np.sum(cloud.mass * cloud.speed**2) / np.sum(cloud.mass))

@@ -30,6 +30,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         "scene": str(path),
         "pacing": "lockstep",
         "duration": scene.duration,
+        "end_on_fault": True,
         "recording": str(options.out / f"{scene.name}.rrd"),
         "output": str(options.out),
         "view": options.view,

@@ -1,11 +1,13 @@
 """Play a scene with the trajectories it holds, in pure Python, without ROS."""
 
 import argparse
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 from sand_sim.cli.console import Console
 from sand_sim.config_folder import find_scene
+from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.interruption import Interruption
 from sand_sim.playing import commands_at, frame_times
 from sand_sim.report import progress_line, summary_text
@@ -49,7 +51,11 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     for time in frame_times(scene, options.duration):
         for command in commands_at(scene, time):
             world.apply(command)
-        world.step(round((time - world.time) / world.time_step))
+        try:
+            world.step(round((time - world.time) / world.time_step))
+        except UnstableError as error:
+            recorder.log.fault = str(error)
+            break
         recorder.write(world.observe())
         console.line(progress_line(recorder.log))
         if interruption.asked:
@@ -58,4 +64,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     files = recorder.close()
     print(f"{scene.name}:\n{summary_text(recorder.log.summarise())}")
     print("written: " + ", ".join(str(path) for path in [recording, *files] if path))
+    if recorder.log.fault:
+        print(f"sand_sim: {recorder.log.fault}", file=sys.stderr)
+        return 1
     return 130 if interruption.asked else 0

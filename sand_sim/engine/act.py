@@ -4,7 +4,7 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.response import build_onward, build_response, build_stored_energy, memory_type
+from sand_sim.contact.response import build_meeting, build_onward, build_response, build_stored_energy, memory_type
 from sand_sim.engine.recipe import Recipe
 from sand_sim.integrator import VERLET
 
@@ -40,6 +40,7 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
     centred = recipe.integrator == VERLET
     response, onward = build_response(recipe.contact, precision, centred), build_onward(recipe.contact, precision, centred)
     stored_energy = build_stored_energy(recipe.contact, precision)
+    meeting, lagging = build_meeting(precision), recipe.integrator != VERLET
 
     @wp.func
     def act(
@@ -67,13 +68,17 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
             couple[contact] = vec4(turn[0], turn[1], turn[2], arm_loss)
         if wp.static(couples):
             moment[contact] = resistance
+        if depth > deepest[lane]:
+            wp.atomic_max(deepest, lane, depth)
         if wp.static(measuring):
-            energy[contact] = stored_energy(met, pair, after)
-        else:
-            if wp.static(history):
-                memory[contact] = onward(met, after, dt)
-            if depth > deepest[lane]:
-                wp.atomic_max(deepest, lane, depth)
+            stored_in = met
+            if wp.static(lagging):
+                # Velocities are those of the middle of the last step; energies add up if the overlap is taken there, too.
+                overlap = met.overlap + real(0.5) * dt * met.normal_speed
+                stored_in = meeting(met.normal, overlap, met.slip, met.turning, met.radius, met.least, met.mass)
+            energy[contact] = stored_energy(stored_in, pair, after)
+        elif wp.static(history):
+            memory[contact] = onward(met, after, dt)
 
     @wp.func
     def release(

@@ -4,7 +4,7 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.engine.flags import FAULT_NOT_FINITE
+from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_TOO_FAST
 from sand_sim.engine.free_rotation import rotate_freely, spin_of
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.recipe import Recipe
@@ -122,20 +122,18 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
 
             step = velocity * (dt / quantum) + remainder[b]
             jump = vec3(wp.rint(step[0]), wp.rint(step[1]), wp.rint(step[2]))
-            far = wp.max(wp.max(wp.abs(jump[0]), wp.abs(jump[1])), wp.abs(jump[2]))
-            if not wp.isfinite(far) or not wp.isfinite(wp.length(turning_now)):
-                fault[0] = fault[0] | wp.static(FAULT_NOT_FINITE)
+            # Squares, because a maximum loses what is not a number.
+            square = wp.dot(jump, jump)
+            if not (square < real(parking) * real(parking)) or not wp.isfinite(wp.dot(turning_now, turning_now)):
+                bit = int(wp.static(FAULT_NOT_FINITE))
+                if wp.isfinite(square):
+                    bit = int(wp.static(FAULT_TOO_FAST))
+                fault[0] = fault[0] | bit
                 continue
-            inside = far < real(parking)
-            x = at[0]
-            y = at[1]
-            z = at[2]
-            if inside:
-                x += whole(jump[0])
-                y += whole(jump[1])
-                z += whole(jump[2])
-                inside = wp.abs(x) <= half_extent[0] and wp.abs(y) <= half_extent[1] and wp.abs(z) <= half_extent[2]
-            if not inside:
+            x = at[0] + whole(jump[0])
+            y = at[1] + whole(jump[1])
+            z = at[2] + whole(jump[2])
+            if wp.abs(x) > half_extent[0] or wp.abs(y) > half_extent[1] or wp.abs(z) > half_extent[2]:
                 body_place[b] = whole4(parking, parking, parking, whole(0))
                 for m in range(first, last):
                     place[sphere_at[m]] = whole4(parking, parking, parking, whole(0))
@@ -156,7 +154,11 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
                 u = x + whole(wp.rint(spot[0]))
                 v = y + whole(wp.rint(spot[1]))
                 w = z + whole(wp.rint(spot[2]))
-                place[i] = whole4(u, v, w, place[i][3])
+                was = place[i]
+                leap = vec3(real(u - was[0]), real(v - was[1]), real(w - was[2]))
+                if wp.dot(leap, leap) > real(0.25) * real(was[3]) * real(was[3]):
+                    fault[0] = fault[0] | wp.static(FAULT_TOO_FAST)
+                place[i] = whole4(u, v, w, was[3])
                 carried = now + wp.cross(omega, arm)
                 motion[i] = vec4(carried[0], carried[1], carried[2], motion[i][3])
                 spin[i] = vec4(omega[0], omega[1], omega[2], spin[i][3])

@@ -6,14 +6,14 @@ import numpy as np
 
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.energy import blocks_for
-from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_ROOM
+from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_ROOM, FAULT_TOO_FAST
 from sand_sim.engine.measuring import record_measurement
 from sand_sim.engine.stages import choose_stages, record_renewal, record_run
 from sand_sim.engine.state import put_state, take_state
 
 
 class UnstableError(RuntimeError):
-    """A velocity is no longer a number: the time step does not resolve the contacts."""
+    """A run has blown up; the message says what happened."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class ExplicitDem:
         """Advance by a number of steps.
 
         Raises:
-            UnstableError: if a velocity is no longer finite.
+            UnstableError: if a velocity is no longer finite, or a grain moves more than half its radius in one step.
         """
         left = self.arrays.flags.steps_left
         left.fill_(steps)
@@ -145,14 +145,24 @@ class ExplicitDem:
         self._program(record)()
         fault = int(flags.fault.numpy()[0])
         flags.fault.zero_()
-        if fault & FAULT_NOT_FINITE:
-            raise UnstableError(
-                f"a grain's velocity is not finite after step {self.steps_done}; "
-                f"take a smaller time step than {self.arrays.setting.dt:.3g} s"
-            )
+        if fault & (FAULT_NOT_FINITE | FAULT_TOO_FAST):
+            raise UnstableError(self._describe_fault())
         if fault & FAULT_ROOM:
             self.arrays.make_room()
             self._programs.clear()
+
+    def _describe_fault(self) -> str:
+        """The worst grain after a fault."""
+        grains, dt = self.arrays.grains, self.arrays.setting.dt
+        active = grains.active.get()
+        radius = grains.place.numpy()[:active, 3] * self.arrays.lattice.quantum
+        speed = np.linalg.norm(grains.motion.numpy()[:active, :3].astype(float), axis=1)
+        share = np.where(radius > 0.0, speed * dt / np.maximum(radius, self.arrays.lattice.quantum), 0.0)
+        worst = int(np.argmax(np.where(np.isfinite(share), share, np.inf)))
+        name = f"grain {grains.identity.numpy()[worst]}"
+        if not np.isfinite(share[worst]):
+            return f"the velocity of {name} is not finite"
+        return f"{name} moves by {share[worst]:.2g} of its radius in one step, at {speed[worst]:.3g} m/s; half is the limit"
 
     def _program(self, record):
         """The recorded program, recorded at its first use since the arrays were last replaced."""

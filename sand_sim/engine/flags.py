@@ -5,6 +5,7 @@ import warp as wp
 # Bits of ``Flags.fault``: why stepping stopped before the asked number of steps.
 FAULT_ROOM = 1  # a list found more contacts than it can hold; the host makes room and goes on
 FAULT_NOT_FINITE = 2  # a grain's velocity is no longer a number
+FAULT_TOO_FAST = 4  # a grain moves more than half its radius in one step, so that it may pass through others unseen
 
 
 class Flags:

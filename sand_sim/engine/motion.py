@@ -4,7 +4,7 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.engine.flags import FAULT_NOT_FINITE
+from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_TOO_FAST
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.recipe import Recipe
 from sand_sim.integrator import VERLET
@@ -212,13 +212,13 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
 
             step = velocity * (dt / quantum) + remainder[i]
             jump = vec3(wp.rint(step[0]), wp.rint(step[1]), wp.rint(step[2]))
-            far = wp.max(wp.max(wp.abs(jump[0]), wp.abs(jump[1])), wp.abs(jump[2]))
-            if not (far < real(parking)):
-                if not wp.isfinite(far):
-                    fault[0] = fault[0] | wp.static(FAULT_NOT_FINITE)
-                    continue
-                place[i] = whole4(parking, parking, parking, whole(0))
-                grains_moved[0] = 1
+            # A square, because a maximum loses what is not a number.
+            square = wp.dot(jump, jump)
+            if not (square <= real(0.25) * real(here[3]) * real(here[3])):
+                bit = int(wp.static(FAULT_NOT_FINITE))
+                if wp.isfinite(square):
+                    bit = int(wp.static(FAULT_TOO_FAST))
+                fault[0] = fault[0] | bit
                 continue
             remainder[i] = step - jump
             x = here[0] + whole(jump[0])

@@ -9,7 +9,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the node until it is interrupted or its duration is over.
 
     Returns:
-        Exit code: 0, or 1 if the node could not start.
+        Exit code: 0, or 1 if the node could not start, or was to end when the run blows up and it did.
     """
     interruption = Interruption()  # before the long imports
     import rclpy
@@ -29,7 +29,7 @@ def main(arguments: list[str] | None = None) -> int:
         executor.add_node(node)
         while not (interruption.asked or node.done):
             executor.spin_once(timeout_sec=0.1)
-        return 0
+        return 1 if node.simulation.fault else 0
     except (InterruptedByUserError, ExternalShutdownException):
         return 0
     except (SceneError, ValueError, ParameterException) as error:

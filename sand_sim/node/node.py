@@ -5,6 +5,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.node import Node
@@ -21,6 +22,7 @@ from msg_adapters.geometry_msgs import pose_to_command, report_to_wrench
 from msg_adapters.sensor_msgs import grains_to_cloud
 from sand_sim.border import CommandError, Observation
 from sand_sim.config_folder import find_scene
+from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.node.parameters import declare_parameters, read_parameters
 from sand_sim.report import progress_line
 from sand_sim.scene.reading import load_scene
@@ -32,6 +34,7 @@ OUTPUT = QoSProfile(reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolic
 COMMANDS = QoSProfile(reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=100)
 _DIAGNOSTICS_PERIOD = 1.0  # [s] wall
 _PROGRESS_PERIOD = 5.0  # [s] wall
+_COARSE_POINTS = 0.01  # resolution of points over the smallest radius
 
 
 class SandSimNode(Node):
@@ -47,7 +50,7 @@ class SandSimNode(Node):
     Attributes:
         simulation: the running world.
         recorder: what the run leaves behind.
-        done: whether the asked duration has been reached.
+        done: whether the asked duration has been reached, or the run has blown up and shall end then.
     """
 
     def __init__(self, progress=lambda stage, share: None, **node_arguments):
@@ -64,7 +67,6 @@ class SandSimNode(Node):
         self.done = False
         self._next_points, self._told, self._diagnosed = 0.0, time.monotonic(), 0.0
         self._last: Observation | None = None
-        self._fault: Exception | None = None
         self.simulation = Simulation(
             world,
             settings["pacing"],
@@ -76,6 +78,7 @@ class SandSimNode(Node):
         self._advertise()
         if world.assembly.time_step.warning:
             self.get_logger().warning(world.assembly.time_step.warning)
+        self._warn_of_coarse_points(world)
         self.simulation.pause(settings["paused"])
         self.simulation.start()
         self.get_logger().info(f"scene '{scene.name}' is ready, pacing {settings['pacing']}")
@@ -122,15 +125,11 @@ class SandSimNode(Node):
         self._last = observation
         if observation.steps == 0:
             self._next_points = 0.0
-        self._clock_publisher.publish(Clock(clock=time_to_stamp(observation.time)))
-        for report in observation.tools:
-            self._wrenches[report.name].publish(report_to_wrench(report, observation.time))
+        self._publish_state(observation)
         rate = self.get_parameter("points_rate").value
         if rate > 0.0 and observation.time >= self._next_points - 1e-9:
             self._next_points = max(self._next_points + 1.0 / rate, observation.time)
-            decimation = self.get_parameter("points_decimation").value
-            cloud = grains_to_cloud(observation.spheres, observation.time, self._settings["frame_id"], decimation)
-            self._points.publish(cloud)
+            self._publish_points(observation)
         self.recorder.write(observation)
         if time.monotonic() - self._told > _PROGRESS_PERIOD:
             self._told = time.monotonic()
@@ -138,9 +137,33 @@ class SandSimNode(Node):
         duration = self._settings["duration"]
         self.done = self.done or bool(duration and observation.time > duration - 0.5 * self.simulation.frame)
 
+    def _warn_of_coarse_points(self, world: World) -> None:
+        """Messages hold points in single precision, which far from the origin is coarser than the simulation."""
+        lattice, smallest = world.assembly.lattice, min(world.assembly.smallest.values())
+        resolution = float(np.spacing(np.float32(np.abs([lattice.low, lattice.high]).max())))
+        if resolution > _COARSE_POINTS * smallest:
+            self.get_logger().warning(
+                f"this far from the origin ~/points are rounded to {resolution:.2g} m, the simulation is not; "
+                "put the scene nearer to the origin of its frame"
+            )
+
+    def _publish_state(self, observation: Observation) -> None:
+        self._clock_publisher.publish(Clock(clock=time_to_stamp(observation.time)))
+        for report in observation.tools:
+            self._wrenches[report.name].publish(report_to_wrench(report, observation.time))
+
+    def _publish_points(self, observation: Observation) -> None:
+        decimation = self.get_parameter("points_decimation").value
+        cloud = grains_to_cloud(observation.spheres, observation.time, self._settings["frame_id"], decimation)
+        self._points.publish(cloud)
+
     def _fail(self, error: Exception) -> None:
-        self._fault = error
+        """Called in the stepping thread; the world is back in its last good state."""
+        if isinstance(error, UnstableError):
+            self._last = self.simulation.world.observe()
+        self.recorder.log.fault = str(error)
         self.get_logger().error(f"stepping has stopped: {error}")
+        self.done = self.done or self._settings["end_on_fault"]
 
     def _diagnose(self) -> None:
         if self._last is None:
@@ -154,9 +177,12 @@ class SandSimNode(Node):
         } | {f"commands rejected: {reason}": str(count) for reason, count in simulation.rejected.items()}
         device = f"cpu, {simulation.world.assembly.solver.device.lanes} threads"
         message = health_to_diagnostics(self._last.health, self._last.time, f"{self.get_name()}: world", device, further)
-        if self._fault is not None:
+        if simulation.fault is not None:
             message.status[0].level = DiagnosticStatus.ERROR
-            message.status[0].message = f"stepping has stopped: {self._fault}"
+            message.status[0].message = f"stepping has stopped: {simulation.fault}"
+            # Whoever comes now still sees the last good state.
+            self._publish_state(self._last)
+            self._publish_points(self._last)
         self._diagnostics.publish(message)
 
     async def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -40,6 +40,7 @@ DECLARATIONS = (
     Declaration("points_decimation", 1, "Publish the grains whose id is a multiple of this [1].", 1, 1_000_000, changeable=True),
     Declaration("paused", False, "Start held; go on with the pause service."),
     Declaration("duration", 0.0, "End after this simulated time [s]; 0 for never.", 0.0, 1.0e9),
+    Declaration("end_on_fault", False, "End with exit code 1 when the run blows up; otherwise wait for a reset."),
     Declaration("recording", "", "Rerun recording to write (.rrd); empty for none."),
     Declaration("view", False, "Open the Rerun viewer."),
     Declaration("particles", False, "Draw the particles of tools in Rerun."),

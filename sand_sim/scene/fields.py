@@ -81,6 +81,12 @@ class Field:
             raise self.refuse(f"must be a text, got {_shown(self.value)}")
         return self.value
 
+    def yes_or_no(self) -> bool:
+        """True or false."""
+        if not isinstance(self.value, bool):
+            raise self.refuse(f"must be true or false, got {_shown(self.value)}")
+        return self.value
+
     def choice(self, known: Iterable[str]) -> str:
         """One of the known names."""
         known = list(known)

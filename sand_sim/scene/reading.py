@@ -250,11 +250,14 @@ def _liquid(entry: Field) -> Liquid:
 
 
 def _solver(entry: Field) -> Solver:
-    entry.keys(("time_step", "skin", "integrator", "precision", "device", "threads"))
+    entry.keys(("time_step", "force_time_step", "skin", "integrator", "precision", "device", "threads"))
 
     def auto(key, read):
         return None if entry.value.get(key) == "auto" else entry.optional(key, read, None)
 
+    forced = entry.optional("force_time_step", Field.yes_or_no, False)
+    if forced and entry.value.get("time_step") in (None, "auto"):
+        raise entry["force_time_step"].refuse("needs a 'time_step' of its own")
     return Solver(
         time_step=auto("time_step", lambda f: f.number(above=0.0, unit="s")),
         skin=auto("skin", lambda f: f.number(above=0.0, unit="m")),
@@ -262,6 +265,7 @@ def _solver(entry: Field) -> Solver:
         precision=entry.optional("precision", lambda f: f.choice(PRECISIONS), "single"),
         device=entry.optional("device", Field.text, "auto"),
         threads=auto("threads", lambda f: f.whole(1)),
+        force_time_step=forced,
     )
 
 

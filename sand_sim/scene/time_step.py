@@ -1,5 +1,6 @@
 """The largest time step that resolves a scene, and what it comes from."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,11 +8,15 @@ import numpy as np
 from sand_sim.contact.law import PairNumbers
 from sand_sim.contact.model import ContactModel
 from sand_sim.scene.pairing import pair_numbers
+from sand_sim.scene.stable_step import DEEP, network_steps
 from sand_sim.scene.types import Material, Scene, SceneError
 
 CONTACT_FRACTION = 1.0 / 25.0  # of the shortest contact time
 RAYLEIGH_FRACTION = 0.2  # of the shortest Rayleigh time
-REFUSED = 3.0  # times the chosen step: a user's step beyond is refused
+STABLE_FRACTION = 1.0  # of the largest step that is stable in a dense bed; a bound, see there what margin it leaves
+TRAVEL_FRACTION = 0.05  # of the smallest radius, which nothing crosses in one step
+REFUSED = 3.0  # times the chosen step: a user's step beyond is refused unless forced
+_BED = "stability of damped contacts"
 WARNED = 1.0  # times the chosen step: a user's step beyond is warned about
 
 
@@ -62,8 +67,9 @@ class TimeStep:
         contact: shortest contact time at the fastest speed, or half period of a spring [s].
         rayleigh: shortest Rayleigh time, infinite with linear springs [s].
         speed: fastest relative speed reckoned with [m/s].
-        reason: which of the two decided.
+        reason: which of the limits decided.
         warning: empty, or what is doubtful about a step given by the user.
+        stable: largest step at which damped contacts in a dense bed are stable, see stable_step.py [s].
     """
 
     value: float
@@ -73,25 +79,30 @@ class TimeStep:
     speed: float
     reason: str
     warning: str = ""
+    stable: float = np.inf
 
 
-def fastest_speed(scene: Scene, top: float, bottom: float, given: float) -> float:
-    """Relative speed of the hardest contact to expect [m/s]: free fall through the scene, grains' own speeds, tools."""
-    fall = float(np.sqrt(2.0 * np.linalg.norm(scene.gravity) * max(top - bottom, 0.0)))
+def fastest_speed(scene: Scene, height: float, given: float) -> float:
+    """Relative speed of the hardest contact to expect [m/s]: free fall from a height [m], grains' own speeds [m/s], tools."""
+    fall = float(np.sqrt(2.0 * np.linalg.norm(scene.gravity) * height))
     tools = max((tool.max_speed for tool in scene.tools), default=0.0)
     return max(fall + 2.0 * given, tools + given, 1e-3)
 
 
-def choose_time_step(scene: Scene, smallest: dict[str, float], speed: float) -> TimeStep:
+def choose_time_step(
+    scene: Scene, smallest: dict[str, float], speed: float, spacings: Sequence[float], depth: float = DEEP
+) -> TimeStep:
     """Choose the time step, or check the one the scene gives.
 
     Args:
         scene: materials and the step asked for.
         smallest: smallest grain radius of each grain material [m].
         speed: fastest relative speed to expect [m/s].
+        spacings: of the particles of each tool, in the order of the scene [m].
+        depth: overlap over radius up to which contacts shall be stable [1].
 
     Raises:
-        SceneError: if the scene's own step is far beyond what is stable.
+        SceneError: if the scene's own step is far beyond what is stable and not forced.
     """
     named = {m.name: m for m in scene.materials}
     contact = rayleigh = np.inf
@@ -105,17 +116,25 @@ def choose_time_step(scene: Scene, smallest: dict[str, float], speed: float) -> 
         for other, half_radius, half_mass in meetings:
             pair = pair_numbers(scene, grain, other)
             contact = min(contact, shortest_oscillation(scene.contact, pair, half_radius, half_mass, speed))
-    safe = min(CONTACT_FRACTION * contact, RAYLEIGH_FRACTION * rayleigh)
-    reason = "contact time" if CONTACT_FRACTION * contact < RAYLEIGH_FRACTION * rayleigh else "Rayleigh time"
-    asked = scene.solver.time_step
+    stable = min(network_steps(scene, smallest, spacings, depth))
+    limits = {
+        "contact time": CONTACT_FRACTION * contact,
+        "Rayleigh time": RAYLEIGH_FRACTION * rayleigh,
+        _BED: STABLE_FRACTION * stable,
+        "travel in one step": TRAVEL_FRACTION * min(smallest.values()) / speed,
+    }
+    reason = min(limits, key=limits.get)
+    safe, asked = limits[reason], scene.solver.time_step
     if asked is None:
-        return TimeStep(safe, safe, contact, rayleigh, speed, reason)
-    if asked > REFUSED * safe:
+        return TimeStep(safe, safe, contact, rayleigh, speed, reason, "", stable)
+    # Grains that are not packed bear more than a dense bed does, so its stability is a warning only.
+    loose = min(limit for name, limit in limits.items() if name != _BED)
+    if asked > REFUSED * loose and not scene.solver.force_time_step:
         raise SceneError(
             f"solver.time_step: {asked:.3g} s is {asked / safe:.1f} times the safe step of {safe:.3g} s ({reason}); "
-            f"use 'auto' or at most {REFUSED * safe:.3g}"
+            f"use 'auto' or at most {REFUSED * loose:.3g}, or set solver.force_time_step to see it fail"
         )
     warning = ""
     if asked > WARNED * safe * 1.0001:
         warning = f"time step {asked:.3g} s is {asked / safe:.1f} times the safe step of {safe:.3g} s ({reason})"
-    return TimeStep(asked, safe, contact, rayleigh, speed, reason, warning)
+    return TimeStep(asked, safe, contact, rayleigh, speed, reason, warning, stable)

@@ -158,6 +158,7 @@ class Solver:
     precision: str = "single"
     device: str = "auto"
     threads: int | None = None
+    force_time_step: bool = False  # run with the given time step however large it is
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ class RunLog:
         rows: values of each frame by name.
         last: the last observation.
         scenes: the observation at the end of each phase of a trajectory, by the phase's name.
+        fault: why the run stopped before its end, empty if it did not.
     """
 
     scene: Scene
@@ -31,6 +32,7 @@ class RunLog:
     rows: list[dict] = field(default_factory=list)
     last: Observation | None = None
     scenes: dict[str, Observation] = field(default_factory=dict)
+    fault: str = ""
 
     def write(self, observation: Observation) -> None:
         """Add one observation."""
@@ -81,7 +83,7 @@ class RunLog:
             "contacts": health.contacts,
             "largest_overlap_over_radius": health.deepest,
             "energy_J": energies,
-            "doubts": list(health.doubts),
+            "doubts": [*health.doubts, *([self.fault] if self.fault else [])],
             "tools": {tool.name: _summarise_tool(columns, tool) for tool in self.scene.tools},
         }
         return json.loads(json.dumps(summary, default=float))

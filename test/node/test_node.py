@@ -12,7 +12,7 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="needs ROS 2")
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
@@ -101,8 +101,8 @@ def start_node(ros, tmp_path):
     """``start_node(pacing=..., ...)`` runs a node on the small scene in a thread of this process."""
     running = []
 
-    def start(**parameters):
-        scene = write_small_scene(tmp_path)
+    def start(solver=None, **parameters):
+        scene = write_small_scene(tmp_path, solver=solver or {})
         overrides = [Parameter(name, value=value) for name, value in ({"scene": str(scene)} | parameters).items()]
         node = SandSimNode(parameter_overrides=overrides)
         executor = SingleThreadedExecutor()
@@ -331,3 +331,48 @@ def test_nothing_is_left_behind(start_process, tmp_path):
     process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
     assert set(os.listdir("/dev/shm")) - before == set()
+
+
+FORCED = {"time_step": 4.5e-4, "force_time_step": True}  # blows up after a while
+
+
+def test_a_run_that_blows_up_stops_and_comes_back(client, start_node):
+    node = start_node(solver=FORCED, pacing="lockstep")
+    client.connect()
+    for at in frame_times(node.simulation.world.scene):
+        for command in commands_at(node.simulation.world.scene, at):
+            client.poses.publish(command_to_pose(command, "world"))
+    client.wait_for(lambda: client.diagnostics and client.diagnostics[-1].status[0].level == DiagnosticStatus.ERROR)
+    message = client.diagnostics[-1].status[0].message
+    assert message.startswith("stepping has stopped: blown up at t = ")
+    assert "s would be safe" in message
+    stopped = node.simulation.world.time
+    assert 0.0 < stopped < 0.4
+
+    late = Client()  # comes after the fault, and still sees the last good state
+    late.wait_for(lambda: late.clouds and late.wrenches and late.clocks)
+    assert stamp_to_time(late.clouds[-1].header.stamp) == pytest.approx(stopped, abs=1e-6)
+    assert np.all(np.isfinite(cloud_to_points(late.clouds[-1])["x"]))
+    assert late.time == pytest.approx(stopped, abs=1e-6)
+    late.close()
+
+    client.send(START, at=stopped + 0.1)
+    answer = client.call(Trigger, "step")
+    assert not answer.success
+    assert "blown up" in answer.message
+    assert client.call(SetBool, "pause", SetBool.Request(data=False)).success
+    assert node.simulation.rejected["stopped"] == 1
+    assert client.call(Trigger, "reset").success
+    client.wait_for(lambda: client.time == 0.0)
+    assert client.call(Trigger, "step").message.startswith("t = 0.0")
+    client.wait_for(lambda: client.diagnostics[-1].status[0].level == DiagnosticStatus.WARN)
+
+
+def test_the_node_can_end_when_a_run_blows_up(start_process, tmp_path):
+    write_small_scene(tmp_path, solver={"time_step": 9e-4, "force_time_step": True})
+    process = start_process(scene="small.yaml", pacing="fast", end_on_fault=True, output=tmp_path / "out")
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert "stepping has stopped: blown up at t = " in errors
+    assert "Traceback" not in errors
+    assert (tmp_path / "out" / "small.json").is_file()

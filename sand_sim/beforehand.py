@@ -1,0 +1,85 @@
+"""What is doubtful about a world before its first step: overlaps, tools too fine, lengths too small for its numbers."""
+
+import numpy as np
+
+from sand_sim.assemble import Assembly
+from sand_sim.observing import observe_grains
+from sand_sim.scene.pairing import effective_young, pair_numbers
+from sand_sim.scene.stable_step import DEEP, particles_touched
+
+_CROWD = 2.0  # particles of a tool that a grain may touch at once in an impact
+_COARSE = 0.1  # resolution over the overlap under a grain's own weight, or of an impact at the expected speed
+
+
+def find_overlap(assembly: Assembly) -> tuple[str, ...]:
+    """Doubts that grains start inside one another, a wall or a tool; contact lists must be up to date."""
+    sums, doubts = assembly.solver.measure(), []
+    if sums.deepest > DEEP:
+        share = f"{100.0 * sums.deepest:.0f} % of a radius"
+        doubts.append(f"grains overlap by {share} at the start; the {sums.elastic:.3g} J stored there drive them apart")
+    position = observe_grains(assembly).position
+    for tool in assembly.tools:
+        inside = int((tool.distance(position) < -tool.body.radius).sum())
+        if inside:
+            doubts.append(f"grains start inside tool '{tool.tool.name}' ({inside} of them), where nothing touches them")
+    return tuple(doubts)
+
+
+def find_fine_tools(assembly: Assembly) -> tuple[str, ...]:
+    """Doubts that tools have particles so fine that grains touch many at once, each with springs and dashpots of its own."""
+    doubts = []
+    radius, material = max((radius, name) for name, radius in assembly.smallest.items())
+    for model in assembly.tools:
+        overlap = min(_impact_overlap(assembly, material, radius, model.tool.material), DEEP * radius)
+        touched = particles_touched(radius, model.body.radius, model.body.spacing, overlap)
+        if touched > _CROWD:
+            doubts.append(
+                f"grains touch about {touched:.0f} particles of tool '{model.tool.name}' at once, so contacts are stiffer and "
+                f"restitution lower than asked; take a particle_radius nearer to {0.3 * radius:.2g} m"
+            )
+    return tuple(doubts)
+
+
+def find_coarseness(assembly: Assembly) -> tuple[str, ...]:
+    """The doubt that positions are not resolved finely enough for the overlaps to expect."""
+    resolution, overlap = _resolution(assembly), _smallest_overlap(assembly)
+    if resolution <= _COARSE * overlap:
+        return ()
+    remedy = "" if assembly.recipe.precision.name == "double" else " or solver.precision double"
+    return (
+        f"positions are resolved to {resolution:.2g} m, but the smallest grains overlap by only {overlap:.2g} m; "
+        f"take a smaller domain, softer grains{remedy}",
+    )
+
+
+def _resolution(assembly: Assembly) -> float:
+    """Rounding of the distance between a grain and what it touches [m]."""
+    lattice, epsilon = assembly.lattice, assembly.recipe.precision.epsilon
+    oblique = [wall for wall in assembly.walls if wall.kind != "plane" or np.count_nonzero(wall.direction) > 1]
+    reach = 0.5 * float(np.linalg.norm(lattice.high - lattice.low)) if oblique else 0.0
+    return max([lattice.quantum, epsilon * reach, *(epsilon * tool.extent for tool in assembly.tools)])
+
+
+def _smallest_overlap(assembly: Assembly) -> float:
+    """Overlap of the smallest grains [m]: under their weight, ``(3 m g/(4 E* sqrt(R)))^(2/3)``, without gravity in an impact."""
+    scene, overlaps = assembly.scene, []
+    gravity = float(np.linalg.norm(scene.gravity))
+    for name, radius in assembly.smallest.items():
+        material = scene.materials[scene.material_index(name)]
+        weight = material.density * 4.0 / 3.0 * np.pi * radius**3 * gravity
+        if scene.contact.normal == "linear":
+            static = weight / pair_numbers(scene, name, name).given["stiffness"]
+        else:
+            static = (0.75 * weight / (effective_young(material, material) * np.sqrt(radius))) ** (2.0 / 3.0)
+        overlaps.append(static if gravity else _impact_overlap(assembly, name, radius, name))
+    return float(min(overlaps))
+
+
+def _impact_overlap(assembly: Assembly, grain: str, radius: float, other: str) -> float:
+    """Overlap of a grain in an impact on something flat at the expected speed, ``(15 m v^2/(16 E* sqrt(R)))^(2/5)`` [m]."""
+    scene = assembly.scene
+    material, met = (scene.materials[scene.material_index(name)] for name in (grain, other))
+    mass, speed = material.density * 4.0 / 3.0 * np.pi * radius**3, assembly.time_step.speed
+    if scene.contact.normal == "linear":
+        return float(speed * np.sqrt(mass / pair_numbers(scene, grain, other).given["stiffness"]))
+    return float((0.9375 * mass * speed**2 / (effective_young(material, met) * np.sqrt(radius))) ** 0.4)
