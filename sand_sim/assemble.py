@@ -71,6 +71,7 @@ class Assembly:
         frame_steps: steps per frame.
         lattice: the domain.
         recipe: static choices.
+        pair_table: ``MaterialPair`` structs, one row per material.
         solver: holds the device arrays.
     """
 
@@ -85,6 +86,7 @@ class Assembly:
     frame_steps: int
     lattice: Lattice
     recipe: Recipe
+    pair_table: list[list]
     solver: ExplicitDem
 
     @cached_property
@@ -149,6 +151,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         materials=len(_loose_materials(scene)) > 1,
         bodies=len(table.bodies) > 0,
     )
+    pairs = _pair_table(scene, order, precision)
     skin = scene.solver.skin or _SKIN * float(table.radius.mean())
     arrays = DemArrays(
         recipe,
@@ -157,12 +160,12 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         table,
         [_surface(wall, order, lattice) for wall in walls],
         [ToolBody(tool.body.points, tool.body.radius, order.index(tool.tool.material)) for tool in tools],
-        _pair_table(scene, order, precision),
+        pairs,
         device.lanes,
         device.name,
     )
     numbers, solver = [fill.grains for fill in fills], ExplicitDem(arrays, device)
-    return Assembly(scene, numbers, table, walls, tools, bodies, smallest, time_step, frame_steps, lattice, recipe, solver)
+    return Assembly(scene, numbers, table, walls, tools, bodies, smallest, time_step, frame_steps, lattice, recipe, pairs, solver)
 
 
 def _open_device(scene: Scene, spheres: int):

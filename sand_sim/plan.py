@@ -1,0 +1,185 @@
+"""What a scene keeps and leaves out: stages, arrays, kernels, time step and what a run will cost, before it runs."""
+
+import time
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+import warp as wp
+
+from sand_sim.assemble import Assembly
+from sand_sim.engine.arrays import DemArrays
+from sand_sim.engine.explicit_dem import ExplicitDem
+from sand_sim.engine.lattice import Lattice
+from sand_sim.engine.measuring import record_measurement
+from sand_sim.engine.recipe import Recipe
+from sand_sim.engine.stages import record_run
+from sand_sim.grain_table import GrainTable
+from sand_sim.integrator import VERLET
+from sand_sim.scene.clumps import place_clumps
+from sand_sim.scene.shapes import tetrahedron
+
+_SAMPLE_EDGE = 13  # grains along each edge of the packed sample that a cost is measured on
+_SAMPLE_STEPS = 60
+_OVERLAP = 0.01  # of the diameter, between neighbours in the sample
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a scene comes down to.
+
+    Attributes:
+        grains, spheres: numbers.
+        kept: stages with when they run.
+        left_out: what is neither compiled nor allocated, with the reason.
+        kernels: names of the compiled kernels.
+        arrays: bytes by array.
+        bytes_per_sphere: of all of them [B].
+        time_step: value and limits [s], and what decides.
+        steps: of the scene's duration.
+        sphere_step: measured on a packed sample of this scene's recipe on this machine [s]; None if not measured.
+        duration: predicted run time of the scene without settling [s]; None if not measured.
+    """
+
+    grains: int
+    spheres: int
+    kept: dict[str, str]
+    left_out: dict[str, str]
+    kernels: list[str]
+    arrays: dict[str, int]
+    bytes_per_sphere: float
+    time_step: dict
+    steps: int
+    sphere_step: float | None
+    duration: float | None
+
+
+class _Listing:
+    """A recorder that only notes which kernels are launched."""
+
+    def __init__(self, lanes: int):
+        self.lanes, self.kernels = lanes, {}
+
+    def each(self, launched, over, inputs, wait=True):
+        self.kernels[launched.key] = None
+
+    def share(self, launched, inputs, wait=True):
+        self.kernels[launched.key] = None
+
+    once = share
+
+    def when(self, flag, body):
+        body()
+
+    repeat = when
+
+    def wait(self):
+        """Lanes are of no interest here."""
+
+
+def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
+    """Plan a scene.
+
+    Args:
+        assembly: from ``assemble``, before anything runs.
+        measure: run a packed sample of grains for a moment to predict the cost.
+    """
+    arrays, scene, solver = assembly.solver.arrays, assembly.scene, assembly.solver
+    listing = _Listing(arrays.lanes)
+    record_run(arrays, solver.stages, listing)
+    record_measurement(arrays, solver.stages, listing)
+    sizes = array_sizes(arrays)
+    steps = round(scene.duration / assembly.time_step.value)
+    spheres = len(assembly.table)
+    cost = measure_cost(assembly) if measure else None
+    stages = solver.stages
+    kept = {s.name: "when a grain has moved half the skin" for s in stages.listing}
+    kept |= {s.name: "when a tool has moved half the skin" for s in stages.tool_listing}
+    kept |= {s.name: "every step" for s in stages.step}
+    return Plan(
+        grains=assembly.table.grains,
+        spheres=spheres,
+        kept=kept,
+        left_out=left_out(assembly),
+        kernels=sorted(name.rsplit("__", 1)[-1] for name in listing.kernels),
+        arrays=sizes,
+        bytes_per_sphere=sum(sizes.values()) / spheres,
+        time_step=asdict(assembly.time_step),
+        steps=steps,
+        sphere_step=cost,
+        duration=None if cost is None else cost * spheres * steps,
+    )
+
+
+def left_out(assembly: Assembly) -> dict[str, str]:
+    """What the scene does not need, with the reason."""
+    scene, recipe = assembly.scene, assembly.recipe
+    contact = recipe.contact
+    reasons = {
+        "contact history": None if recipe.history else f"contact.tangential '{contact.tangential}' remembers nothing",
+        "rotation": None if recipe.rotation else "no contact law turns a sphere",
+        "rolling and twisting moments": None if contact.couples else "contact.rolling and contact.twisting are 'none'",
+        "cohesion and its reach": None if contact.cohesive else "contact.cohesion is 'none'",
+        "rigid bodies": None if recipe.bodies else "all grains are single spheres",
+        "material of each grain": None if recipe.materials else "all grains are of one material",
+        "half-step velocities": None if recipe.integrator == VERLET else f"solver.integrator is '{recipe.integrator}'",
+        "walls": None if assembly.walls else "the scene has no boundaries",
+        "tools": None if scene.tools else "the scene has no tools",
+        "settling": None if scene.settle.time > 0.0 else "settle.time is 0",
+    }
+    return {what: why for what, why in reasons.items() if why}
+
+
+def array_sizes(arrays: DemArrays) -> dict[str, int]:
+    """Bytes of all device arrays by name; arrays that share memory count once."""
+    sizes, seen = {}, set()
+
+    def walk(name: str, value) -> None:
+        if isinstance(value, wp.array):
+            if value.ptr and value.ptr not in seen:
+                seen.add(value.ptr)
+                sizes[name] = value.capacity
+        elif isinstance(value, dict):
+            for key, entry in value.items():
+                walk(f"{name}.{getattr(key, '__name__', key)}", entry)
+        elif type(value).__module__.startswith("sand_sim.engine"):
+            for key, entry in vars(value).items():
+                walk(f"{name}.{key}".lstrip("."), entry)
+
+    walk("", arrays)
+    return sizes
+
+
+def measure_cost(assembly: Assembly) -> float:
+    """Time of one sphere and step [s] in a packed sample with this scene's kernels, on this machine and its threads."""
+    table = _packed_sample(assembly)
+    lattice = Lattice(table.position.min(axis=0) - 1.0, table.position.max(axis=0) + 1.0, assembly.recipe.precision)
+    setting = assembly.solver.arrays.setting
+    recipe: Recipe = replace(assembly.recipe, materials=False)
+    device = assembly.solver.device
+    sample = DemArrays(
+        recipe, replace(setting, gravity=np.zeros(3)), lattice, table, [], [], assembly.pair_table, device.lanes, device.name
+    )
+    solver = ExplicitDem(sample, device)
+    solver.run(2)
+    best = np.inf
+    for _ in range(3):
+        begin = time.perf_counter()
+        solver.run(_SAMPLE_STEPS)
+        best = min(best, time.perf_counter() - begin)
+    return best / (_SAMPLE_STEPS * len(table))
+
+
+def _packed_sample(assembly: Assembly) -> GrainTable:
+    """A cube of grains that just touch their six neighbours."""
+    number, radius = _SAMPLE_EDGE**3, float(np.median(assembly.table.radius))
+    corner = np.stack(np.meshgrid(*[range(_SAMPLE_EDGE)] * 3, indexing="ij"), -1).reshape(-1, 3).astype(float)
+    still, density = np.zeros((number, 3)), float(assembly.table.density[0])
+    if not assembly.recipe.bodies:
+        position = corner * 2.0 * radius * (1.0 - _OVERLAP)
+        columns = (np.full(number, radius), np.full(number, density), np.zeros(number, int))
+        return GrainTable.of_spheres(position, still, still.copy(), *columns)
+    shape = tetrahedron()
+    equal = radius * shape.equal_radius
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (number, 1))
+    position = corner * 2.0 * radius * (1.0 + 0.4)
+    return place_clumps(shape, position, turns, np.full(number, equal), still, still.copy(), density, 0)

@@ -1,0 +1,85 @@
+"""What a scene does not need is neither compiled nor allocated."""
+
+import json
+
+import numpy as np
+import pytest
+from scenes import floor, write_small_scene
+
+from sand_sim.assemble import assemble
+from sand_sim.cli.main import main
+from sand_sim.plan import make_plan
+from sand_sim.scene.reading import read_scene
+from sand_sim.scene.shapes import TETRAHEDRON
+
+
+@pytest.fixture
+def plan_of(make_world):
+    def plan(**further):
+        position = 0.012 * np.stack(np.meshgrid(range(4), range(4), range(4), indexing="ij"), -1).reshape(-1, 3)
+        return make_plan(make_world(position, 0.005, **further).assembly, measure=False)
+
+    return plan
+
+
+def names(plan, *parts):
+    return [name for name in plan.arrays if any(part in name for part in parts) and not name.startswith("flags")]
+
+
+def test_frictionless_spheres_keep_no_history_rotation_or_bodies(plan_of):
+    plan = plan_of(contact={"tangential": "none"}, numbers={}, precision="single")
+    assert not names(plan, "memory", "drawer", "spin", "couple", "moment", "bodies", "member", "felt", "wall", "tool", "material")
+    assert not [kernel for kernel in plan.kernels if any(word in kernel for word in ("bod", "tool", "surface", "wrench"))]
+    assert {"contact history", "rotation", "rigid bodies", "walls", "tools"} <= set(plan.left_out)
+
+
+def test_each_feature_brings_its_own_arrays_and_nothing_else(plan_of):
+    lean = plan_of(contact={"tangential": "none"}, precision="single")
+    frictional = plan_of(precision="single")
+    rolling = plan_of(contact={"rolling": "spring"}, numbers={"rolling_friction": 0.1}, precision="single")
+    walled = plan_of(contact={"tangential": "none"}, boundaries=floor(), precision="single")
+    assert lean.bytes_per_sphere < frictional.bytes_per_sphere < rolling.bytes_per_sphere
+    assert {name.split(".")[-1] for name in set(frictional.arrays) - set(lean.arrays)} >= {"memory", "couple", "spin"}
+    assert {name for name in set(walled.arrays) - set(lean.arrays) if "wall" not in name} == set()
+
+
+def test_frictionless_kernels_contain_no_code_of_what_was_left_out(make_world):
+    """The source that Warp generates for the pair forces speaks of no spin and no memory."""
+
+    def sources(**further):
+        world = make_world([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]], 0.005, **further)
+        from sand_sim.engine.pair_forces import build_pair_forces
+
+        kernel = build_pair_forces(world.assembly.recipe)
+        kernel.module.load("cpu")
+        return "".join(str(block.body_forward) for block in kernel.adj.blocks)
+
+    lean, full = sources(contact={"tangential": "none"}), sources()
+    assert "var_spin" in full
+    assert "var_spin" not in lean
+    assert len(lean) < 0.8 * len(full)
+
+
+def test_clumps_are_counted_as_grains_and_spheres(tmp_path):
+    path = write_small_scene(tmp_path)
+    fill = {"material": "sand", "shape": TETRAHEDRON, "radius": 0.004, "count": 20}
+    fill["region"] = {"low": [-0.05, -0.05, 0.0], "high": [0.05, 0.05, 0.1]}
+    import yaml
+
+    parsed = yaml.safe_load(path.read_text()) | {"fills": [fill]}
+    plan = make_plan(assemble(read_scene(parsed, tmp_path)))
+    assert (plan.grains, plan.spheres) == (20, 80)
+    assert "move bodies" in plan.kept
+    assert plan.duration > 0.0
+
+
+def test_verb_prints_text_and_json(tmp_path, capsys):
+    path = write_small_scene(tmp_path)
+    assert main(["plan", str(path), "--no-measure"]) == 0
+    text = capsys.readouterr().out
+    for word in ("stages kept", "left out", "bytes per sphere", "kernels", "time step"):
+        assert word in text
+    assert main(["plan", str(path), "--json"]) == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert plan["spheres"] == 32
+    assert plan["sphere_step"] > 0.0
