@@ -58,7 +58,7 @@ def test_small_study(small):
 
 
 def test_best_of_each_choice_are_run_together(small, monkeypatch):
-    """With run times made up: a softer material halves it, a thicker skin takes it to a third, a stiffer material saves nothing."""
+    """With run times made up: a softer material halves them, a thicker skin takes them to a third."""
     whole = Wrench.measure
 
     def measure(self, world, check):
