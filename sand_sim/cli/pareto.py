@@ -92,7 +92,7 @@ def _sum_up(study: Study, chosen: tuple | None, tolerance: float) -> None:
     if orders:
         print("  order in the time step: " + ", ".join(f"{name} {order:.2f}" for name, order in orders.items()))
     if scatter is not None:
-        print(f"  by chance alone, two sets of runs of the reference lie {percent(scatter)} apart; smaller errors mean nothing")
+        print(f"  by chance alone, two sets of runs of the reference lie {percent(scatter)} apart; more --repeats lower that")
     if chosen is None:
         best = min((row for row in study.rows() if row.trusted), key=lambda row: row.error.high, default=None)
         nearest = f"; the nearest is '{best.title}' with {percent(best.error.high)}" if best else ""

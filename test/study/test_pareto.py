@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 import yaml
@@ -36,7 +37,7 @@ def test_small_study(small):
     lines = []
     study = Study(*small, Plan("wrench", 10.0, 2, variations), lines.append)
     study.run()
-    rows = {row.title: row for row in study.rows()}
+    rows = {row.title: row for row in study.rows() if row.group != "together"}  # which hangs on the moment's run times
     assert set(rows) == {"as written", REFERENCE.title, *(one.title for one in variations)} - {"time step: safe"}
     for title in ("as written", "skin: 0.5 radii", REFERENCE.title):
         row = rows[title]
@@ -54,6 +55,25 @@ def test_small_study(small):
     assert row.within(10.0)
     assert variation.title == row.title
     assert any("repeat 2/2" in line for line in lines)
+
+
+def test_best_of_each_choice_are_run_together(small, monkeypatch):
+    """With run times made up: a softer material halves them, a thicker skin takes them to a third."""
+    whole = Wrench.measure
+
+    def measure(self, world, check):
+        faster = 2.0 if world.scene.materials[0].young < 1e7 else 1.0
+        return replace(whole(self, world, check), wall=12.0 / faster / (3.0 if world.scene.solver.skin else 1.0), doubts=())
+
+    monkeypatch.setattr(Wrench, "measure", measure)
+    study = Study(*small, Plan("wrench", 1e6, 2, chosen("skin: 0.5 radii", "stiffness: E x 0.3", "stiffness: E x 3")))
+    study.run()
+    variation, row = study.recommendation()
+    assert row.title == "together: stiffness: E x 0.3, skin: 0.5 radii"
+    assert (row.time.middle, row.runs) == (2.0, 2)
+    edited = variation.apply(small[0], study.facts)
+    assert edited["solver"]["skin"] == pytest.approx(0.0025)
+    assert float(edited["materials"]["sand"]["young"]) == pytest.approx(3e6)
 
 
 def test_nothing_is_recommended_where_nothing_is_good_enough(small):
