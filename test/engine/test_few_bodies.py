@@ -107,7 +107,8 @@ def test_isolated_grains_keep_their_momenta(make_world, precision, tolerance):
     assert observation.health.dissipated > 0.0
 
 
-def test_elastic_frictionless_gas_keeps_its_energy(make_world):
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_elastic_frictionless_gas_keeps_its_energy(make_world, precision):
     position, radius, velocity, _ = gas(seed=5)
     box = {"type": "box", "name": "box", "material": "wall", "low": [-0.01] * 3, "high": [0.05] * 3}
     world = make_world(
@@ -118,6 +119,7 @@ def test_elastic_frictionless_gas_keeps_its_energy(make_world):
         friction=0.0,
         contact={"tangential": "none"},
         boundaries=[box],
+        precision=precision,
     )
     start = world.observe().health
     world.step(round(0.1 / world.time_step))
