@@ -1,0 +1,1 @@
+"""What sand_sim measures about itself: speed, cost of features, published cases."""
