@@ -18,7 +18,7 @@ run: $(READY)
 	$(VENV)/bin/sand_sim run $(SCENE) --out $(OUT) $(if $(VIEW),--view)
 
 test: $(READY)
-	$(VENV)/bin/python -m pytest -m "not full and not slow"
+	$(VENV)/bin/python -m pytest -m "not slow"
 
 test-full: $(READY)
 	$(VENV)/bin/python -m pytest

@@ -133,11 +133,13 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     tools = [_model_tool(tool, scene, progress) for tool in scene.tools]
     walls = [wall for boundary in scene.boundaries for wall in walls_of(boundary)]
     order = _material_order(scene)
+    bodies = [model_body(body, scene, progress) for body in scene.bodies]
     fills = [
-        fill_grains(fill, scene.materials[scene.material_index(fill.material)], order.index(fill.material), [*walls, *tools])
+        fill_grains(
+            fill, scene.materials[scene.material_index(fill.material)], order.index(fill.material), [*walls, *tools, *bodies]
+        )
         for fill in scene.fills
     ]
-    bodies = [model_body(body, scene, progress) for body in scene.bodies]
     table = GrainTable.join([*fills, *(body.table(order.index(body.body.material)) for body in bodies)])
     device = _open_device(scene, len(table))
     smallest = {order[k]: float(table.radius[table.material == k].min()) for k in np.unique(table.material)}

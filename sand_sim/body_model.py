@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from sampler import MeshError, locate_mesh, read_mesh, sample_body
+from sampler import MeshError, SignedDistance, locate_mesh, read_mesh, sample_body
 from sand_sim import rotation
 from sand_sim.grain_table import BodyTable, GrainTable
 from sand_sim.scene.clumps import members_of
@@ -46,6 +46,18 @@ class BodyModel:
         )
         owner = np.zeros(len(self.shape.radii), int)
         return members_of(row, owner, self.shape.centres, self.shape.radii, self.mass / self.shape.volume, material)
+
+    def distance(self, position: np.ndarray) -> np.ndarray:
+        """Distance of world points, shape (n, 3), from the body where the scene puts it, shape (n,) [m]."""
+        pose = self.body.pose
+        local = rotation.rotate(rotation.inverse(np.asarray(pose.orientation)), position - np.asarray(pose.position))
+        if self.mesh is not None:
+            return SignedDistance(self.mesh).query(local)[0] - self.body.particle_radius
+        local = (local - self.shape.middle) @ self.shape.axes
+        nearest = np.full(len(position), np.inf)
+        for centre, radius in zip(self.shape.centres, self.shape.radii, strict=True):
+            nearest = np.minimum(nearest, np.linalg.norm(local - centre, axis=1) - radius)
+        return nearest
 
     def own_frame(self, position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pose of the body's own frame, (3,) and (4,), from that of its principal frame."""

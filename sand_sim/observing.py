@@ -203,7 +203,7 @@ def observe_health(assembly: Assembly, start: StartEnergy, beforehand: tuple[str
         dissipated=dissipated,
         fastest=sums.fastest,
         contacts=sums.touching,
-        retired=start.grains - count_grains(assembly),
+        retired=int(start.grains) - count_grains(assembly),
         doubts=(),
         gained=max(start.most_dissipated - dissipated - start.rounding - sums.touching * start.per_contact, 0.0),
     )

@@ -23,7 +23,7 @@ def test_missing_data_are_refused_in_one_line(tmp_path):
     assert len(done.stderr.strip().splitlines()) == 1
 
 
-@pytest.mark.full
+@pytest.mark.slow
 def test_ball_goes_as_deep_as_in_eight_other_codes(tmp_path):
     data = ROOT.parent / "shared/data/dosta"
     if not data.is_dir():
