@@ -12,20 +12,16 @@ Run from the root of the source tree: ``python -m benchmarks.dosta_ball --data F
 
 import argparse
 import json
-import os
-import platform
-import subprocess
 import sys
 import tempfile
 import time
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.provenance import ROOT, provenance
 from sand_sim import Scene, SceneError, World, read_scene
 
-ROOT = Path(__file__).parents[1]
 DATA = ROOT.parent / "shared/data/dosta"
 GRAINS, WALLS = "Penetration_25KParticles.txt", "Penetration_walls.txt"
 REPORTED = {20: -102.1, 25: -124.0, 30: -138.2}  # displacement of the ball [mm] at a time [ms]
@@ -132,15 +128,6 @@ def draw(times: np.ndarray, shift: np.ndarray, path: Path) -> None:
     plt.close(figure)
 
 
-def processor_name() -> str:
-    """Name of the processor."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.machine()
-    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Run the benchmark and print its JSON line.
 
@@ -161,12 +148,7 @@ def main(arguments: list[str] | None = None) -> int:
         except SceneError as error:
             print(f"dosta_ball: {error}", file=sys.stderr)
             return 1
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)
-    report |= {
-        "commit": commit.stdout.strip() or "unknown",
-        "device": f"{processor_name()}, {options.threads or os.cpu_count()} threads",
-        "versions": {name: version(name) for name in ("warp-lang", "numpy")} | {"python": platform.python_version()},
-    }
+    report |= provenance(options.threads)
     print(json.dumps(report))
     if options.out:
         draw(times, shift, options.out / "dosta_ball.png")
