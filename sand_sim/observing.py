@@ -135,7 +135,7 @@ def observe_tools(
         return ()
     work = tools.work.numpy()
     reports = []
-    for index, (model, track) in enumerate(zip(assembly.tools, tracks, strict=True)):
+    for index, (model, track) in enumerate(zip(assembly.tools, tracks, strict=True)):  # terrains come after the tools
         position, orientation = track.at(time)
         moving = track.moving_at(time - 0.5 * assembly.time_step.value)
         back = rotation.inverse(orientation)
@@ -158,14 +158,21 @@ def observe_tools(
 
 
 def observe_walls(assembly: Assembly) -> tuple[WallReport, ...]:
-    """Forces on all walls at the last step."""
-    contacts = assembly.solver.arrays.wall_list
-    if contacts is None:
-        return ()
-    number = contacts.pairs.get()
-    wall, force = contacts.partner.numpy()[:number], contacts.force.numpy()[:number].astype(float)
-    totals = np.column_stack([np.bincount(wall, force[:, k], len(assembly.walls)) for k in range(3)])
-    return tuple(WallReport(one.name, -total) for one, total in zip(assembly.walls, totals, strict=True))
+    """Forces on all walls at the last step, and where plungers are; terrains come last."""
+    arrays, reports = assembly.solver.arrays, []
+    if arrays.walls:
+        contacts, surfaces = arrays.wall_list, arrays.walls.numpy()
+        number = contacts.pairs.get()
+        wall = np.searchsorted(surfaces["first"], contacts.partner.numpy()[:number], side="right") - 1
+        force = contacts.force.numpy()[:number].astype(float)
+        totals = np.column_stack([np.bincount(wall, force[:, k], len(assembly.walls)) for k in range(3)])
+        states = arrays.plungers.states.numpy() if arrays.plungers else None
+        for one, total, plunger in zip(assembly.walls, totals, surfaces["plunger"], strict=True):
+            offset, speed = (states[plunger]["offset"], states[plunger]["seen"]) if plunger >= 0 else (0.0, 0.0)
+            reports.append(WallReport(one.name, -total, one.point + offset * one.direction, speed * one.direction))
+    for index, ground in enumerate(assembly.grounds, start=len(assembly.tools)):
+        reports.append(WallReport(ground.name, arrays.tools.wrench.numpy()[index, 0].copy(), ground.place.copy(), np.zeros(3)))
+    return tuple(reports)
 
 
 def count_grains(assembly: Assembly) -> int:
@@ -189,6 +196,7 @@ def observe_health(assembly: Assembly, start: StartEnergy, beforehand: tuple[str
     """
     arrays, chosen, sums = assembly.solver.arrays, assembly.time_step, assembly.solver.measure()
     work = float(arrays.tools.work.numpy().sum()) if arrays.tools else 0.0
+    work += float(arrays.plungers.states.numpy()["work"].sum()) if arrays.plungers else 0.0
     kinetic = sums.translation + sums.rotation
     dissipated = start.total + work - kinetic - sums.height - sums.elastic
     start.most_dissipated = max(start.most_dissipated, dissipated)
