@@ -157,12 +157,12 @@ def _lay_spheres(surface: Surface, wall: Wall, lattice: Lattice) -> int:
     if wall.kind == CYLINDER:
         first_row, last_row = span(direction, row_spacing)
         first_row -= first_row % 2
-        surface.begin = np.array([surface.begin[0], first_row * row_spacing])
-        surface.end = np.array([surface.end[0], last_row * row_spacing])
+        surface.begin = np.array([wall.radius / lattice.quantum, first_row * row_spacing])
+        surface.end = np.array([wall.radius / lattice.quantum, last_row * row_spacing])
         surface.rows = last_row - first_row + 1
         surface.answers_begin = surface.answers_end = BOTH_SIDES
     else:
         surface.rows = ceil(float(np.linalg.norm(wall.end - wall.begin)) / (row_spacing * lattice.quantum) - 1e-9) + 1
-    widest = max(surface.begin[0], surface.end[0])
+    widest = max(float(surface.begin[0]), float(surface.end[0]))
     surface.columns = ceil(2.0 * pi * widest / spacing) + 1
     return surface.rows * surface.columns
