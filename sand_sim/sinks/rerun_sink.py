@@ -11,6 +11,7 @@ import rerun.blueprint as rrb
 from sand_sim.border import Observation
 from sand_sim.sinks.colours import colour_by_speed
 from sand_sim.sinks.viewer import open_viewer
+from sand_sim.sinks.wall_mesh import shell_mesh
 from sand_sim.world import World
 
 _TIMELINE = "sim_time"
@@ -31,6 +32,7 @@ class RerunSink:
     def __init__(self, world: World, path: Path | None, view: bool = False, particles: bool = False):
         self._fastest = max((tool.max_speed for tool in world.scene.tools), default=1.0)
         self._identity = np.zeros(0, int)
+        self._plungers = {wall.name for wall in world.assembly.walls if wall.drive}
         self._recording = rr.RecordingStream("sand_sim", recording_id=None)
         sinks = []
         if path is not None:
@@ -57,6 +59,10 @@ class RerunSink:
         if not np.array_equal(grains.identity, self._identity):
             self._identity = grains.identity
             recording.log("world/grains", rr.Points3D.from_fields(radii=grains.radius.astype(np.float32)))
+        for wall in observation.walls:
+            if wall.name in self._plungers:
+                recording.log(f"world/walls/{wall.name}", rr.Transform3D(translation=wall.position))
+                recording.log(f"force/{wall.name}", rr.Scalars(float(np.linalg.norm(wall.force))))
         for tool in observation.tools:
             pose = rr.Transform3D(translation=tool.position, quaternion=rr.Quaternion(xyzw=tool.orientation))
             recording.log(f"world/tools/{tool.name}", pose)
@@ -89,6 +95,21 @@ class RerunSink:
             if boundary.kind == "box":
                 box = rr.Boxes3D(mins=[boundary.low], sizes=[np.subtract(boundary.high, boundary.low)], colors=[[150, 150, 160]])
                 recording.log(f"world/walls/{boundary.name}", box, static=True)
+        for wall in world.assembly.walls:
+            if wall.kind == "shell":
+                corners, triangles = shell_mesh(wall)
+                mesh = rr.Mesh3D(vertex_positions=corners, triangle_indices=triangles, albedo_factor=[150, 150, 160, 90])
+                recording.log(f"world/walls/{wall.name}", mesh, static=True)
+                if not wall.drive:
+                    recording.log(f"world/walls/{wall.name}", rr.Transform3D(translation=wall.point), static=True)
+        for ground in world.assembly.grounds:
+            mesh = rr.Mesh3D(
+                vertex_positions=ground.mesh.vertices + ground.place,
+                triangle_indices=ground.mesh.faces,
+                vertex_normals=ground.mesh.vertex_normals,
+                albedo_factor=[150, 135, 110, 255],
+            )
+            recording.log(f"world/walls/{ground.name}", mesh, static=True)
         for model in world.tools:
             name = f"world/tools/{model.tool.name}"
             corners = np.asarray(model.mesh.triangles, np.float32)  # each face has its own, so that edges look sharp

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 from scenes import record
+from warp._src.context import ModuleBuilder
 
 from sand_sim import World, read_scene
+from sand_sim.engine.recipe import Recipe
+from sand_sim.engine.surface_contacts import build_surface_forces, build_surface_search
 
 GRAVITY = 9.81
 STIFFNESS = 1000.0
@@ -72,10 +75,10 @@ def test_shells_push_from_their_closest_point(make_world, kind, precision):
     fields, begin, end = SHELLS[kind]
     begin, end = np.array(begin), np.array(end)
     normal = np.array([-(end - begin)[1], (end - begin)[0]]) / np.linalg.norm(end - begin)
-    share = random.uniform(-0.1, 1.1, 200)
-    off = random.choice([-1.0, 1.0], (200, 1)) * random.uniform(0.002, 0.0055, (200, 1))
+    share = random.uniform(-0.1, 1.1, 120)
+    off = random.choice([-1.0, 1.0], (120, 1)) * random.uniform(0.002, 0.0055, (120, 1))
     line = begin + share[:, None] * (end - begin) + off * normal
-    position = apart_from_each_other(turned(line, random.uniform(-np.pi, np.pi, 200)), 2.05 * radius)
+    position = apart_from_each_other(turned(line, random.uniform(-np.pi, np.pi, 120)), 2.05 * radius)
     found = overlaps(make_world, [wall(kind, **fields)], position, radius, precision=precision)
 
     line = begin + np.linspace(0.0, 1.0, 601)[:, None] * (end - begin)
@@ -86,7 +89,7 @@ def test_shells_push_from_their_closest_point(make_world, kind, precision):
         overlap = radius - np.linalg.norm(away)
         if overlap > 1e-5:
             touching += 1
-            assert np.linalg.norm(pushed) == pytest.approx(overlap, abs=2e-6)
+            assert np.linalg.norm(pushed) == pytest.approx(overlap, abs=3e-6)
             assert pushed / np.linalg.norm(pushed) @ away / np.linalg.norm(away) > 1.0 - 1e-3
         elif overlap < 0.0:
             assert not pushed.any()
@@ -232,7 +235,7 @@ def test_grain_wider_than_the_hole_sits_in_it(make_world):
 HOPPER = {"bin": 0.03, "hole": 0.016, "grain": 0.0025}
 
 
-def hopper(friction=0.4, count=250, young=1e7, **further):
+def hopper(friction=0.4, count=120, young=5e6, **further):
     """A bin on a cone of 45 degrees, closed by a plate that drops away at time zero."""
     wide, hole, grain = HOPPER["bin"], HOPPER["hole"], HOPPER["grain"]
     up, foot = [0, 0, 1], [0, 0, wide - hole]
@@ -281,9 +284,9 @@ def discharge(scene, folder, duration, frames):
 
 
 def test_hopper_runs_empty_and_nothing_passes_its_walls(tmp_path):
-    rows, world = discharge(hopper(), tmp_path, 0.8, 80)
+    rows, world = discharge(hopper(), tmp_path, 0.5, 50)
     observation = world.observe()
-    assert rows[-1, 1] == 250
+    assert rows[-1, 1] == 120
     assert not observation.health.doubts
     assert observation.health.dissipated > 0.0
     assert observation.wall("gate").position == pytest.approx([0.0, 0.0, -0.11])
@@ -297,15 +300,37 @@ def rate(rows, number, low, high):
 
 @pytest.mark.full
 def test_hopper_flows_evenly_whatever_the_head(tmp_path):
-    """The rate is the same in both halves of the run, falls with friction and is what Beverloo's law allows."""
+    """The rate is constant, falls with friction and is what Beverloo's law allows, ``C rho_b sqrt(g) (D - k d)^2.5``."""
     number, rates = 2000, {}
     for friction in (0.2, 0.6):
-        rows, _ = discharge(hopper(friction, number), tmp_path, 1.1, 220)
-        early, late = rate(rows, number, 0.1, 0.4), rate(rows, number, 0.4, 0.7)
-        assert late == pytest.approx(early, rel=0.1)
+        rows, _ = discharge(hopper(friction, number, 1e7), tmp_path, 1.1, 220)
         rates[friction] = rate(rows, number, 0.1, 0.7)
+    early, late = rate(rows, number, 0.1, 0.4), rate(rows, number, 0.4, 0.7)
+    assert late == pytest.approx(early, rel=0.05)
     assert rates[0.6] < 0.95 * rates[0.2]
     diameter, mass = 2.0 * HOPPER["grain"], 2500.0 * 4.0 / 3.0 * np.pi * HOPPER["grain"] ** 3
     reduced = [(2.0 * HOPPER["hole"] - k * diameter) ** 2.5 for k in (1.5, 1.3)]
     low, high = (c * 0.6 * 2500.0 * np.sqrt(GRAVITY) * one / mass for c, one in zip((0.55, 0.65), reduced, strict=True))
-    assert low < rates[0.6] < 1.2 * high
+    assert low < rates[0.6] < high
+
+
+def test_kernels_know_only_the_walls_there_are(make_world):
+    """A floor compiles no shells, no virtual spheres, no plungers, and keeps no state for them."""
+    world = make_world([[0.0, 0.0, 0.1]], 0.005, boundaries=[wall("plane", [0, 0, 1], [0, 0, 0])], threads=1)
+    assert world.assembly.recipe.surfaces == {"plane"}
+    assert world.assembly.solver.arrays.plungers is None
+    everything = frozenset({"plane", "cylinder", "shell", "rough", "plunger"})
+    for build in (build_surface_forces, build_surface_search):
+        filling = () if build is build_surface_forces else (True,)
+        little, much = (source(build(Recipe(surfaces=one), *filling)) for one in (world.assembly.recipe.surfaces, everything))
+        for word in ("nearest_on_shell", "sphere_at", "ring_count", "var_plungers[", "wp::cos"):
+            assert word not in little
+        assert "nearest_on_shell" in much
+        assert "sphere_at" in much
+        assert len(little) < 0.75 * len(much)
+
+
+def source(kernel):
+    """What Warp would compile."""
+    module = kernel.module
+    return ModuleBuilder(module, module.options, hasher=module.hashers[next(iter(module.hashers))]).codegen("cpu")
