@@ -165,7 +165,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         lattice,
         table,
         make_surfaces(walls, order, lattice, float(table.radius.min())),
-        make_plungers(walls, float(table.mass.sum())),
+        make_plungers(walls, float(table.mass[table.lone].sum() + table.bodies.mass.sum())),
         [ToolBody(tool.body.points, tool.body.radius, order.index(tool.tool.material)) for tool in tools]
         + [ToolBody(ground.body.points, ground.body.radius, order.index(ground.material)) for ground in grounds],
         _pair_table(scene, order, precision),

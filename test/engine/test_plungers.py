@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scenes import floor
 
+from sand_sim import World, read_scene
+
 GRAVITY = 9.81
 FREE = {"low": [-0.05, -0.05, -0.05], "high": [0.05, 0.05, 0.5]}
 
@@ -85,6 +87,30 @@ def test_floor_carries_weight_and_the_pressing_force(make_world):
     health = observation.health
     assert health.tool_work == pytest.approx(force * (0.05 - observation.wall("plunger").position[2]), rel=0.01)
     assert health.dissipated > 0.0
+
+
+def test_floor_carries_four_sphere_grains_and_the_pressing_force(tmp_path):
+    """Frictionless tetrahedra in a box: what they weigh is the mass of the union of their spheres."""
+    force, low, high = 2.0, [0.0, 0.0, 0.0], [0.06, 0.06, 0.4]
+    numbers = {"restitution": 0.2, "friction": 0.0}
+    scene = {
+        "materials": {"sand": {"density": 2500.0, "young": 1e7, "poisson": 0.25}},
+        "pairs": [{"between": ["sand", "sand"]} | numbers],
+        "fills": [
+            {"material": "sand", "shape": "tetrahedron", "radius": 0.005, "region": {"low": low, "high": high}, "count": 50}
+        ],
+        "boundaries": [
+            {"type": "box", "name": "box", "material": "sand", "low": low, "high": high, "open": ["top"]},
+            plunger((0.0, 0.0, 0.15), (0.0, 0.0, -1.0), force=force, max_speed=1.0) | {"material": "sand"},
+        ],
+        "settle": {"time": 0.5, "speed": 1e-4},
+    }
+    world = World(read_scene(scene, tmp_path))
+    world.step(round(1.0 / world.time_step))
+    observation = world.observe()
+    carried = observation.grains.mass.sum() * GRAVITY + force
+    assert -observation.wall("box/bottom").force[2] == pytest.approx(carried, rel=1e-3)
+    assert observation.wall("plunger").force[2] == pytest.approx(force, rel=1e-3)
 
 
 def test_force_moves_a_free_plunger_as_a_mass_up_to_its_top_speed(make_world):
