@@ -165,7 +165,7 @@ def observe_walls(assembly: Assembly) -> tuple[WallReport, ...]:
         number = contacts.pairs.get()
         wall = np.searchsorted(surfaces["first"], contacts.partner.numpy()[:number], side="right") - 1
         force = contacts.force.numpy()[:number].astype(float)
-        totals = np.column_stack([np.bincount(wall, force[:, k], len(assembly.walls)) for k in range(3)])
+        totals = np.column_stack([np.bincount(wall, force[:, k], len(assembly.walls)) for k in range(3)]).astype(float)
         states = arrays.plungers.states.numpy() if arrays.plungers else None
         for one, total, plunger in zip(assembly.walls, totals, surfaces["plunger"], strict=True):
             offset, speed = (states[plunger]["offset"], states[plunger]["seen"]) if plunger >= 0 else (0.0, 0.0)

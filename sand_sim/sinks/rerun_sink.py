@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+import trimesh
 
 from sand_sim.border import Observation
 from sand_sim.sinks.colours import colour_by_speed
@@ -103,25 +104,24 @@ class RerunSink:
                 if not wall.drive:
                     recording.log(f"world/walls/{wall.name}", rr.Transform3D(translation=wall.point), static=True)
         for ground in world.assembly.grounds:
-            mesh = rr.Mesh3D(
-                vertex_positions=ground.mesh.vertices + ground.place,
-                triangle_indices=ground.mesh.faces,
-                vertex_normals=ground.mesh.vertex_normals,
-                albedo_factor=[150, 135, 110, 255],
-            )
+            mesh = _flat_mesh(ground.mesh, ground.place, [150, 135, 110, 255])
             recording.log(f"world/walls/{ground.name}", mesh, static=True)
         for model in world.tools:
             name = f"world/tools/{model.tool.name}"
-            corners = np.asarray(model.mesh.triangles, np.float32)  # each face has its own, so that edges look sharp
-            mesh = rr.Mesh3D(
-                vertex_positions=corners.reshape(-1, 3),
-                vertex_normals=np.repeat(np.asarray(model.mesh.face_normals, np.float32), 3, axis=0),
-                albedo_factor=[140, 150, 165, 255],
-            )
+            mesh = _flat_mesh(model.mesh, np.zeros(3), [140, 150, 165, 255])
             recording.log(f"{name}/mesh", mesh, static=True)
             if particles:
                 points = rr.Points3D(model.body.points.astype(np.float32), radii=model.body.radius, colors=[[90, 120, 190]])
                 recording.log(f"{name}/particles", points, static=True)
+
+
+def _flat_mesh(mesh: trimesh.Trimesh, place: np.ndarray, colour: list[int]) -> rr.Mesh3D:
+    """A mesh whose faces each have corners of their own, so that edges look sharp."""
+    return rr.Mesh3D(
+        vertex_positions=(np.asarray(mesh.triangles) + place).reshape(-1, 3).astype(np.float32),
+        vertex_normals=np.repeat(np.asarray(mesh.face_normals, np.float32), 3, axis=0),
+        albedo_factor=colour,
+    )
 
 
 def _blueprint(world: World) -> rrb.Blueprint:

@@ -54,8 +54,15 @@ class RunLog:
             row[f"{tool.name}.force"] = tool.world_force
             row[f"{tool.name}.torque"] = tool.torque
             row[f"{tool.name}.carried"] = tool.carried
+        for wall in observation.walls:
+            if wall.name in self._plungers:
+                row[f"wall.{wall.name}.position"], row[f"wall.{wall.name}.force"] = wall.position, wall.force
         self.rows.append(row)
         self.last = observation
+
+    @property
+    def _plungers(self) -> set[str]:
+        return {boundary.name for boundary in self.scene.boundaries if boundary.drive}
 
     @property
     def real_time_factor(self) -> float:

@@ -31,6 +31,13 @@ def test_what_is_read():
     assert (ground.heights, ground.spacing, ground.scale) == (Path("/scenes/hill.csv"), 0.01, 1.0)
 
 
+def test_plungers_and_terrains_need_names_of_their_own():
+    """They are known by name where their motion and forces are shown."""
+    parsed = changed(("boundaries",), [PLUNGER | {"velocity": 0.1}, PLUNGER | {"velocity": 0.2}])
+    with pytest.raises(SceneError, match="'plunger' is the name of several; give the plunger a 'name' of its own"):
+        read_scene(parsed, Path.cwd())
+
+
 @pytest.mark.parametrize(
     ("entry", "named"),
     [
