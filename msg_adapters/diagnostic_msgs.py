@@ -27,6 +27,7 @@ def health_to_diagnostics(
         "elastic energy [J]": f"{health.elastic:.6g}",
         "work of tools [J]": f"{health.tool_work:.6g}",
         "dissipated [J]": f"{health.dissipated:.6g}",
+        "momentum residual [1]": f"{health.momentum_residual:.3g}",
         "fastest grain [m/s]": f"{health.fastest:.4g}",
         "contacts": str(health.contacts),
         "grains retired": str(health.retired),

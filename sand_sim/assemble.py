@@ -16,7 +16,6 @@ from sand_sim.engine.explicit_dem import ExplicitDem
 from sand_sim.engine.lanes import available_cores
 from sand_sim.engine.lattice import Lattice
 from sand_sim.engine.recipe import Recipe
-from sand_sim.engine.surfaces import CYLINDER, PLANE, surface_type
 from sand_sim.engine.tool_body import ToolBody
 from sand_sim.grain_table import GrainTable
 from sand_sim.precision import PRECISIONS, Precision
@@ -26,6 +25,8 @@ from sand_sim.scene.stable_step import DEEP
 from sand_sim.scene.time_step import TimeStep, choose_time_step, fastest_speed
 from sand_sim.scene.types import Scene, SceneError, Tool
 from sand_sim.scene.walls import Wall, walls_of
+from sand_sim.surfacing import kinds_of, make_plungers, make_surfaces
+from sand_sim.terrain import Ground, model_ground
 
 _SKIN = 0.25  # of the mean grain radius
 _SPHERES_PER_THREAD = 1000
@@ -66,6 +67,7 @@ class Assembly:
         walls: analytic surfaces.
         tools: in the order of the scene.
         bodies: in the order of the scene.
+        grounds: terrains, which the solver has as bodies after the tools.
         smallest: smallest grain radius of each grain material [m].
         time_step: chosen, with its reasons.
         frame_steps: steps per frame.
@@ -81,6 +83,7 @@ class Assembly:
     walls: list[Wall]
     tools: list[ToolModel]
     bodies: list[BodyModel]
+    grounds: list[Ground]
     smallest: dict[str, float]
     time_step: TimeStep
     frame_steps: int
@@ -131,27 +134,32 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         SceneError: if a mesh, a fill or the time step cannot be used; the message names the field.
     """
     tools = [_model_tool(tool, scene, progress) for tool in scene.tools]
+    grounds = [
+        model_ground(one, scene.folder, lambda share, name=one.name: progress(f"sampling {name}", share))
+        for one in scene.boundaries
+        if one.terrain
+    ]
     walls = [wall for boundary in scene.boundaries for wall in walls_of(boundary)]
     order = _material_order(scene)
     bodies = [model_body(body, scene, progress) for body in scene.bodies]
+    solids = [*walls, *tools, *grounds, *bodies]
     fills = [
-        fill_grains(
-            fill, scene.materials[scene.material_index(fill.material)], order.index(fill.material), [*walls, *tools, *bodies]
-        )
+        fill_grains(fill, scene.materials[scene.material_index(fill.material)], order.index(fill.material), solids)
         for fill in scene.fills
     ]
     table = GrainTable.join([*fills, *(body.table(order.index(body.body.material)) for body in bodies)])
     device = _open_device(scene, len(table))
     smallest = {order[k]: float(table.radius[table.material == k].min()) for k in np.unique(table.material)}
-    time_step, frame_steps = _time_step(scene, table, smallest, walls, tools)
+    time_step, frame_steps = _time_step(scene, table, smallest, walls, tools, grounds)
     precision = PRECISIONS[scene.solver.precision]
-    lattice = _lattice(scene, table, walls, tools, precision)
+    lattice = _lattice(scene, table, walls, tools, grounds, precision)
     recipe = Recipe(
         contact=scene.contact,
         precision=precision,
         integrator=scene.solver.integrator,
         materials=len(_loose_materials(scene)) > 1,
         bodies=len(table.bodies) > 0,
+        surfaces=kinds_of(walls),
     )
     pairs = _pair_table(scene, order, precision)
     skin = scene.solver.skin or _SKIN * float(table.radius.mean())
@@ -160,14 +168,18 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         Setting(np.asarray(scene.gravity), time_step.value, skin, _reach(scene, table, order)),
         lattice,
         table,
-        [_surface(wall, order, lattice) for wall in walls],
-        [ToolBody(tool.body.points, tool.body.radius, order.index(tool.tool.material)) for tool in tools],
+        make_surfaces(walls, order, lattice, float(table.radius.min())),
+        make_plungers(walls, float(table.mass[table.lone].sum() + table.bodies.mass.sum())),
+        [ToolBody(tool.body.points, tool.body.radius, order.index(tool.tool.material)) for tool in tools]
+        + [ToolBody(ground.body.points, ground.body.radius, order.index(ground.material)) for ground in grounds],
         pairs,
         device.lanes,
         device.name,
     )
     numbers, solver = [fill.grains for fill in fills], ExplicitDem(arrays, device)
-    return Assembly(scene, numbers, table, walls, tools, bodies, smallest, time_step, frame_steps, lattice, recipe, pairs, solver)
+    return Assembly(
+        scene, numbers, table, walls, tools, bodies, grounds, smallest, time_step, frame_steps, lattice, recipe, pairs, solver
+    )
 
 
 def _open_device(scene: Scene, spheres: int):
@@ -200,12 +212,17 @@ def _material_order(scene: Scene) -> list[str]:
 
 
 def _time_step(
-    scene: Scene, table: GrainTable, smallest: dict[str, float], walls: list[Wall], tools: list[ToolModel]
+    scene: Scene,
+    table: GrainTable,
+    smallest: dict[str, float],
+    walls: list[Wall],
+    tools: list[ToolModel],
+    grounds: list[Ground],
 ) -> tuple[TimeStep, int]:
     """The step, shortened so that a whole number of steps makes a frame unless the scene gives it, and that number."""
     given = float(np.linalg.norm(table.velocity, axis=1).max())
-    speed = fastest_speed(scene, _fall_height(scene, table, walls), given)
-    chosen = choose_time_step(scene, smallest, speed, [tool.body.spacing for tool in tools])
+    speed = fastest_speed(scene, _fall_height(scene, table, walls, grounds), given)
+    chosen = choose_time_step(scene, smallest, speed, [model.body.spacing for model in (*tools, *grounds)])
     frame = 1.0 / scene.frame_rate
     if scene.solver.time_step is not None:
         return chosen, max(1, round(frame / chosen.value))
@@ -213,7 +230,7 @@ def _time_step(
     return replace(chosen, value=frame / steps), steps
 
 
-def _fall_height(scene: Scene, table: GrainTable, walls: list[Wall]) -> float:
+def _fall_height(scene: Scene, table: GrainTable, walls: list[Wall], grounds: list[Ground]) -> float:
     """How far a grain can fall at most, past the lowest grain or on to a floor [m]."""
     down = np.asarray(scene.gravity) / (np.linalg.norm(scene.gravity) or 1.0)
     heights = [float(np.ptp(table.position @ down))]
@@ -221,13 +238,22 @@ def _fall_height(scene: Scene, table: GrainTable, walls: list[Wall]) -> float:
         steepness = -float(wall.direction @ down)
         if wall.kind == "plane" and steepness > _FLOOR:
             heights.append(float((wall.distance(table.position) - table.radius).max()) / steepness)
+    highest = float((table.position @ down).min())
+    boxes = [wall.corners for wall in walls if wall.kind == "shell"] + [ground.mesh.bounds + ground.place for ground in grounds]
+    heights += [float(np.maximum(*(box * down)).sum()) - highest for box in boxes]
     return max(heights)
 
 
-def _lattice(scene: Scene, table: GrainTable, walls: list[Wall], tools: list[ToolModel], precision: Precision) -> Lattice:
+def _lattice(
+    scene: Scene, table: GrainTable, walls: list[Wall], tools: list[ToolModel], grounds: list[Ground], precision: Precision
+) -> Lattice:
     reserve = 1.05 * max([tool.extent for tool in tools] + [float(np.linalg.norm(table.offset, axis=1).max(initial=0.0))])
     if scene.domain is not None:
-        return Lattice(*(np.asarray(corner, float) for corner in scene.domain), precision, reserve)
+        low, high = (np.asarray(corner, float) for corner in scene.domain)
+        for ground in grounds:
+            if not np.all((ground.place > low) & (ground.place < high)):
+                raise SceneError(f"domain: must contain the middle of terrain '{ground.name}', {ground.place.round(3).tolist()}")
+        return Lattice(low, high, precision, reserve)
     corners = [table.position - table.radius[:, None], table.position + table.radius[:, None]]
     for fill in scene.fills:
         if fill.low is not None:
@@ -242,24 +268,12 @@ def _lattice(scene: Scene, table: GrainTable, walls: list[Wall], tools: list[Too
         poses = [tool.tool.pose, *(waypoint.pose for waypoint in tool.tool.trajectory)]
         stops = np.array([pose.position for pose in poses])
         corners += [stops - tool.extent, stops + tool.extent]
+    corners += [wall.corners for wall in walls if wall.kind == "shell"]
+    corners += [ground.mesh.bounds + ground.place for ground in grounds]
     corners = np.concatenate(corners)
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = _MARGIN * float(np.max(high - low))
     return Lattice(low - margin, high + margin, precision, reserve)
-
-
-def _surface(wall: Wall, order: list[str], lattice: Lattice):
-    surface = surface_type(lattice.precision)()
-    surface.kind = PLANE if wall.kind == "plane" else CYLINDER
-    # The point of the surface nearest to the middle of the domain keeps lattice differences small and exact.
-    anchor = wall.point + (lattice.centre - wall.point) @ wall.direction * wall.direction
-    if wall.kind == "plane":
-        anchor = lattice.centre - (lattice.centre - wall.point) @ wall.direction * wall.direction
-    surface.anchor = lattice.precision.whole3(*(int(c) for c in lattice.to_lattice(anchor)))
-    surface.direction = lattice.precision.vec3(*wall.direction)
-    surface.radius = wall.radius
-    surface.material = order.index(wall.material)
-    return surface
 
 
 def _pair_table(scene: Scene, order: list[str], precision: Precision) -> list[list]:
@@ -286,5 +300,6 @@ def _reach(scene: Scene, table: GrainTable, order: list[str]) -> float:
         return 0.0
     pairs = [numbers for a in order for b in order if (numbers := pair_numbers(scene, a, b))]
     sizes = {float(radius) for radius in (table.radius.min(), table.radius.max())}
+    sizes |= {boundary.rough.radius for boundary in scene.boundaries if boundary.rough}
     # The effective radius of two grains lies between half the smaller and, at a wall, the larger one's radius.
     return max(law.reach(pair, least, share * least) for pair in pairs for least in sizes for share in (0.5, 1.0))

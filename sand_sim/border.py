@@ -125,10 +125,14 @@ class WallReport:
     Attributes:
         name: of the boundary, with the side of a box, as in ``bin/bottom``.
         force: of the grains on the wall at the last step, world frame, shape (3,) [N].
+        position: of its point now, shape (3,) [m]; that of a terrain is its frame's origin.
+        velocity: of a plunger, shape (3,) [m/s]; zero for all others.
     """
 
     name: str
     force: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -140,8 +144,10 @@ class Health:
         step_ratio: time step over the safe one [1].
         deepest: largest overlap over grain radius since the start [1].
         kinetic, potential, elastic: energies now [J]; potential against the start.
-        tool_work: of all tools on the sand since the start [J].
+        tool_work: of all tools and plungers on the sand since the start [J].
         dissipated: what is missing from the balance of the above since the start [J]; negative means energy came from nowhere.
+        momentum_residual: force on the grains that comes from no wall, tool or weight, over all their forces [1]; zero but for
+            rounding as long as action equals reaction, NaN with an integrator that does not show it.
         fastest: largest grain speed [m/s].
         contacts: contacts under load.
         retired: grains that have left the domain.
@@ -157,6 +163,7 @@ class Health:
     elastic: float
     tool_work: float
     dissipated: float
+    momentum_residual: float
     fastest: float
     contacts: int
     retired: int
@@ -173,7 +180,7 @@ class Observation:
         steps: since the start.
         grains: all grains.
         tools: one report per tool, in the order of the scene.
-        walls: one report per wall, in the order of the scene.
+        walls: one report per wall, in the order of the scene, terrains last.
         health: error indicators.
         bodies: one report per free rigid body of the scene that is in the domain.
         spheres: what is drawn: all spheres, those of one body with the same identity. The same as ``grains`` without bodies.

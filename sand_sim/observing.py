@@ -7,6 +7,7 @@ import numpy as np
 from sand_sim import rotation
 from sand_sim.assemble import Assembly, ToolModel
 from sand_sim.border import BodyReport, GrainCloud, Health, ToolReport, WallReport
+from sand_sim.integrator import VERLET
 from sand_sim.track import Track
 from sand_sim.trust import find_doubts
 
@@ -135,7 +136,7 @@ def observe_tools(
         return ()
     work = tools.work.numpy()
     reports = []
-    for index, (model, track) in enumerate(zip(assembly.tools, tracks, strict=True)):
+    for index, (model, track) in enumerate(zip(assembly.tools, tracks, strict=True)):  # terrains come after the tools
         position, orientation = track.at(time)
         moving = track.moving_at(time - 0.5 * assembly.time_step.value)
         back = rotation.inverse(orientation)
@@ -158,14 +159,21 @@ def observe_tools(
 
 
 def observe_walls(assembly: Assembly) -> tuple[WallReport, ...]:
-    """Forces on all walls at the last step."""
-    contacts = assembly.solver.arrays.wall_list
-    if contacts is None:
-        return ()
-    number = contacts.pairs.get()
-    wall, force = contacts.partner.numpy()[:number], contacts.force.numpy()[:number].astype(float)
-    totals = np.column_stack([np.bincount(wall, force[:, k], len(assembly.walls)) for k in range(3)])
-    return tuple(WallReport(one.name, -total) for one, total in zip(assembly.walls, totals, strict=True))
+    """Forces on all walls at the last step, and where plungers are; terrains come last."""
+    arrays, reports = assembly.solver.arrays, []
+    if arrays.walls:
+        contacts, surfaces = arrays.wall_list, arrays.walls.numpy()
+        number = contacts.pairs.get()
+        wall = np.searchsorted(surfaces["first"], contacts.partner.numpy()[:number], side="right") - 1
+        force = contacts.force.numpy()[:number].astype(float)
+        totals = np.column_stack([np.bincount(wall, force[:, k], len(assembly.walls)) for k in range(3)]).astype(float)
+        states = arrays.plungers.states.numpy() if arrays.plungers else None
+        for one, total, plunger in zip(assembly.walls, totals, surfaces["plunger"], strict=True):
+            offset, speed = (states[plunger]["offset"], states[plunger]["seen"]) if plunger >= 0 else (0.0, 0.0)
+            reports.append(WallReport(one.name, -total, one.point + offset * one.direction, speed * one.direction))
+    for index, ground in enumerate(assembly.grounds, start=len(assembly.tools)):
+        reports.append(WallReport(ground.name, arrays.tools.wrench.numpy()[index, 0].copy(), ground.place.copy(), np.zeros(3)))
+    return tuple(reports)
 
 
 def count_grains(assembly: Assembly) -> int:
@@ -179,6 +187,43 @@ def count_grains(assembly: Assembly) -> int:
     return int(alone.sum() + (arrays.bodies.place.numpy()[:, 3] > 0).sum())
 
 
+def momentum_residual(assembly: Assembly) -> float:
+    """Net force on the grains now beyond what weight, walls and tools exert, over the sum of their sizes [1].
+
+    Read off the half steps of velocity Verlet, ``F = 2 m (v - w) / dt``, which the solver has just completed; so it tests that
+    each grain has gathered all forces between grains, and their reactions.
+    """
+    arrays, dt = assembly.solver.arrays, assembly.time_step.value
+    if assembly.recipe.integrator != VERLET:
+        return float("nan")
+    grains, bodies = arrays.grains, arrays.bodies
+    active = grains.active.get()
+    alone = grains.place.numpy()[:active, 3] > 0
+    if bodies:
+        alone &= grains.member.numpy()[:active] < 0
+    seen, half = arrays.seen_motion.numpy()[:active][alone].astype(float), grains.half_motion.numpy()[:active][alone]
+    mass, now = seen[:, 3], seen[:, :3]
+    if bodies:
+        alive = bodies.place.numpy()[:, 3] > 0
+        mass = np.append(mass, bodies.motion.numpy()[alive, 3])
+        now = np.concatenate([now, bodies.seen_velocity.numpy()[alive]])
+        half = np.concatenate([half, bodies.half_motion.numpy()[alive]])
+    gained = now - half
+    if not gained.any():  # no step has been done
+        return 0.0
+    force = 2.0 * mass[:, None] * gained / dt
+    gravity = np.asarray(assembly.scene.gravity)
+    outer = mass.sum() * gravity
+    if arrays.wall_list:
+        outer = outer + arrays.wall_list.force.numpy()[: arrays.wall_list.pairs.get()].sum(axis=0, dtype=float)
+    if arrays.tools:
+        outer = outer - arrays.tools.wrench.numpy()[:, 0].sum(axis=0)
+    # Rounding of the velocities shows as a force, which matters where there are hardly any.
+    rounding = assembly.recipe.precision.epsilon * np.abs(2.0 * mass[:, None] * now / dt).sum()
+    size = np.abs(force).sum() + np.abs(outer).sum()
+    return float(max(np.abs(force.sum(axis=0) - outer).max() - rounding, 0.0) / size) if size > 0.0 else 0.0
+
+
 def observe_health(assembly: Assembly, start: StartEnergy, beforehand: tuple[str, ...]) -> Health:
     """Error indicators now; brings the solver's measurements up to date.
 
@@ -189,6 +234,7 @@ def observe_health(assembly: Assembly, start: StartEnergy, beforehand: tuple[str
     """
     arrays, chosen, sums = assembly.solver.arrays, assembly.time_step, assembly.solver.measure()
     work = float(arrays.tools.work.numpy().sum()) if arrays.tools else 0.0
+    work += float(arrays.plungers.states.numpy()["work"].sum()) if arrays.plungers else 0.0
     kinetic = sums.translation + sums.rotation
     dissipated = start.total + work - kinetic - sums.height - sums.elastic
     start.most_dissipated = max(start.most_dissipated, dissipated)
@@ -201,6 +247,7 @@ def observe_health(assembly: Assembly, start: StartEnergy, beforehand: tuple[str
         elastic=sums.elastic,
         tool_work=work,
         dissipated=dissipated,
+        momentum_residual=momentum_residual(assembly),
         fastest=sums.fastest,
         contacts=sums.touching,
         retired=int(start.grains) - count_grains(assembly),

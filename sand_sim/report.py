@@ -32,6 +32,7 @@ def summary_text(summary: dict) -> str:
         ),
         ("contacts", f"{summary['contacts']:,}"),
         ("largest overlap / radius", f"{summary['largest_overlap_over_radius']:.4f}"),
+        ("momentum residual", f"{summary['largest_momentum_residual']:.1e} of all forces"),
         (
             "energy balance",
             f"work of tools {energy['tool_work']:.4g} J = kinetic {energy['kinetic']:.3g} + potential {energy['potential']:.3g}"

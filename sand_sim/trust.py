@@ -7,6 +7,7 @@ from sand_sim.scene.stable_step import DEEP
 
 GAINED = 0.01  # share of the energy handled that may appear from nowhere
 HASTY = 2.0  # times the step that the present top speed asks for
+UNBALANCED = 1e-3  # of all forces that may be without a cause
 BLOWN_UP = 0.5  # share beyond which the run is stopped
 
 
@@ -27,6 +28,9 @@ def find_doubts(health: Health, safe_now: float, beforehand: tuple[str, ...] = (
         doubts.append(f"grains move at {health.fastest:.3g} m/s, which asks for a time step of {safe_now:.2g} s")
     if gained_share(health) > GAINED:
         doubts.append(f"{health.gained:.3g} J appeared from nowhere; take a smaller time step")
+    if health.momentum_residual > UNBALANCED:
+        share = 100.0 * health.momentum_residual
+        doubts.append(f"{share:.2g} % of the forces on grains have no counterpart; a fault of the program, please report it")
     return replace(health, doubts=tuple(doubts))
 
 

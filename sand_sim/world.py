@@ -46,8 +46,9 @@ class World:
         self.assembly: Assembly = assemble(scene, progress)
         self._solver = self.assembly.solver
         self._tool_index = {tool.name: k for k, tool in enumerate(scene.tools)}
+        self._grounds = [Track.rest(ground.pose) for ground in self.assembly.grounds]
         self._set_tracks([Track.rest(tool.pose) for tool in scene.tools])
-        self._solver.begin()
+        self._solver.renew_lists()
         self._beforehand = find_overlap(self.assembly) + find_fine_tools(self.assembly) + find_coarseness(self.assembly)
         self._settle(progress)
         self._strike_off()
@@ -241,7 +242,7 @@ class World:
     def _set_tracks(self, tracks: list[Track]) -> None:
         self._tracks = tracks
         structs = []
-        for track in tracks:
+        for track in [*tracks, *self._grounds]:
             one = ToolTrack()
             one.begin_time, one.end_time = track.begin_time, track.end_time
             one.begin_position, one.begin_rotation = track.begin_position, track.begin_orientation

@@ -13,9 +13,10 @@ from sand_sim.engine.count import Count
 from sand_sim.engine.flags import Flags
 from sand_sim.engine.grains import Grains
 from sand_sim.engine.lattice import Lattice
+from sand_sim.engine.plungers import SUM_BLOCK, Plungers
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.sorting import SortedItems
-from sand_sim.engine.surfaces import surface_type
+from sand_sim.engine.surfaces import Surface
 from sand_sim.engine.tool_body import ToolBody, Tools
 from sand_sim.grain_table import GrainTable
 from sand_sim.integrator import VERLET
@@ -55,6 +56,7 @@ class DemArrays:
         lattice: the domain.
         table: the grains.
         walls: ``Surface`` structs.
+        drives: ``Plunger`` structs of those that move.
         bodies: tools.
         pairs: ``MaterialPair`` structs, one row per material.
         lanes: of the device.
@@ -68,6 +70,7 @@ class DemArrays:
         lattice: Lattice,
         table: GrainTable,
         walls: list,
+        drives: list,
         bodies: list[ToolBody],
         pairs: list,
         lanes: int,
@@ -102,8 +105,10 @@ class DemArrays:
         self.met = SortedItems.allocate(number, 0, lanes, device)
 
         self.pair_list = self._contact_list(_FIRST_PAIRS * number)
-        self.walls = wp.array(walls, dtype=surface_type(precision), device=device) if walls else None
+        self.walls = wp.array(walls, dtype=Surface, device=device) if walls else None
         self.wall_list = self._contact_list(number) if walls else None
+        self.plungers = Plungers(drives, device) if drives else None
+        self.plunger_states = self.plungers.states if drives else None
         farthest = float(table.radius.max()) + setting.listing_gap
         self.tools = Tools(bodies, farthest, precision, device) if bodies else None
         self.tool_list = self._contact_list(max(number // 4, 64)) if bodies else None
@@ -132,6 +137,9 @@ class DemArrays:
             name: wp.zeros(energy.blocks_for(c.pairs.capacity), dtype=wp.vec2d, device=self.device)
             for name, c in self.lists.items()
         }
+        if self.plungers:
+            blocks = -(-self.wall_list.pairs.capacity // SUM_BLOCK)
+            self.plunger_blocks = wp.zeros(blocks * self.plungers.number, dtype=wp.float64, device=self.device)
         if self.tools:
             room = self.tool_list.pairs.capacity
             blocks = -(-room // tool_contacts.SUM_BLOCK)

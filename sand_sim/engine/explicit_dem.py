@@ -80,6 +80,8 @@ class ExplicitDem:
         self.renew_lists()
         arrays.flags.steps_done.zero_()
         arrays.deepest.zero_()
+        if arrays.plungers:
+            arrays.plungers.engage()
         if arrays.tools:
             for sum_so_far in (arrays.tools.wrench, arrays.tools.impulse, arrays.tools.work):
                 sum_so_far.zero_()

@@ -6,6 +6,8 @@ from sand_sim.contact.model import ContactModel
 from sand_sim.integrator import VERLET
 from sand_sim.precision import SINGLE, Precision
 
+PLANE, CYLINDER, SHELL, ROUGH, PLUNGER = "plane", "cylinder", "shell", "rough", "plunger"
+
 
 @dataclass(frozen=True)
 class Recipe:
@@ -17,6 +19,7 @@ class Recipe:
         materials: grains are of more than one material.
         bodies: some grains are rigid bodies of several spheres.
         integrator: one of ``integrator.INTEGRATORS``.
+        surfaces: what walls there are: ``plane``, ``cylinder``, ``shell``; and whether some are ``rough`` or a ``plunger``.
     """
 
     contact: ContactModel = field(default_factory=ContactModel)
@@ -24,6 +27,7 @@ class Recipe:
     materials: bool = False
     bodies: bool = False
     integrator: str = VERLET
+    surfaces: frozenset[str] = frozenset()
 
     @property
     def rotation(self) -> bool:

@@ -6,7 +6,7 @@ from functools import partial
 
 import warp as wp
 
-from sand_sim.engine import body_motion, finish, motion, neighbours, pair_forces, surfaces, tool_contacts
+from sand_sim.engine import body_motion, finish, motion, neighbours, pair_forces, plungers, surface_contacts, tool_contacts
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_lay_cells
 from sand_sim.engine.contact_list import ContactList, record_count, record_fill
@@ -114,8 +114,8 @@ def list_stage(arrays: DemArrays, recorder) -> None:
         recorder.each(neighbours.build_search(arrays.recipe, filling), active, inputs)
 
     def walls(filling):
-        inputs = [grains.place, arrays.walls, quantum, gap, *_list_arguments(arrays, arrays.wall_list)]
-        recorder.each(surfaces.build_surface_search(arrays.recipe, filling), active, inputs)
+        inputs = [grains.place, arrays.walls, arrays.plunger_states, gap / quantum, *_list_arguments(arrays, arrays.wall_list)]
+        recorder.each(surface_contacts.build_surface_search(arrays.recipe, filling), active, inputs)
 
     def fill():
         record_fill(recorder, arrays.pair_list, arrays.every_start, partial(pairs, True))
@@ -127,6 +127,8 @@ def list_stage(arrays: DemArrays, recorder) -> None:
         else:
             recorder.each(neighbours.number_anew, active, [grains.came_from])
         recorder.each(neighbours.build_put_back(grains.place.dtype), active, [grains.place, grains.origin])
+        if arrays.plungers:
+            recorder.once(plungers.forget_plunger_travel, [arrays.plungers.states], wait=False)
         recorder.once(finish.lower_flag, [flags.grains_moved])
 
     record_count(recorder, arrays.pair_list, active, partial(pairs, False), flags)
@@ -163,10 +165,15 @@ def pair_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
 
 
 def wall_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
-    """Forces of walls on grains."""
-    contacts = arrays.wall_list
-    inputs = [*_grain_arguments(arrays, contacts), arrays.walls, *_act_arguments(arrays, "wall")]
-    recorder.each(surfaces.build_surface_forces(arrays.recipe, measuring), contacts.pairs, inputs, wait=not arrays.tools)
+    """Forces of walls on grains, and the sums of those of plungers over blocks of contacts."""
+    contacts, summing = arrays.wall_list, arrays.plungers and not measuring
+    inputs = [*_grain_arguments(arrays, contacts), arrays.walls, arrays.plunger_states, *_act_arguments(arrays, "wall")]
+    last = bool(summing or not arrays.tools)
+    recorder.each(surface_contacts.build_surface_forces(arrays.recipe, measuring), contacts.pairs, inputs, wait=last)
+    if summing:
+        sums = [contacts.pairs.spans, contacts.partner, contacts.force, arrays.walls]
+        sums += [arrays.plungers.number, arrays.plunger_blocks]
+        recorder.share(plungers.build_plunger_blocks(arrays.recipe), sums, wait=not arrays.tools)
 
 
 def tool_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
@@ -225,12 +232,16 @@ def body_stage(arrays: DemArrays, recorder) -> None:
 
 
 def finish_stage(arrays: DemArrays, recorder) -> None:
-    """Sum the wrenches, count the step, move the tools on."""
+    """Sum the wrenches, move the plungers on, count the step, move the tools on."""
     flags, tools, dt = arrays.flags, arrays.tools, arrays.setting.dt
     if tools:
         recorder.once(finish.sum_wrenches, [arrays.tool_list.pairs.spans, arrays.wrench_blocks, tools.wrench], wait=False)
         inputs = [dt, tools.tracks, flags.steps_done, tools.wrench, tools.impulse, tools.work]
         recorder.once(finish.sum_impulses, inputs, wait=False)
+    if arrays.plungers:
+        moved = [arrays.wall_list.pairs.spans, arrays.plunger_blocks, arrays.plungers.drives, arrays.plungers.states]
+        moved += [arrays.plungers.engaged, dt, 1.0 / arrays.lattice.quantum, 0.5 * arrays.setting.skin, flags.grains_moved]
+        recorder.once(plungers.advance_plungers, moved, wait=False)
     ending = [flags.steps_done, flags.steps_left, flags.starting, flags.fault, flags.running]
     recorder.once(finish.finish_step, ending, wait=not tools)
     if tools:

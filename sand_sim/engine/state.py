@@ -77,6 +77,8 @@ def _whole_arrays(arrays: DemArrays) -> dict[str, wp.array]:
     if tools:
         names = ("tracks", "states", "travelled", "wrench", "impulse", "work")
         found |= {f"tools.{name}": getattr(tools, name) for name in names}
+    if arrays.plungers:
+        found |= {f"plungers.{name}": getattr(arrays.plungers, name) for name in ("states", "engaged")}
     return {name: array for name, array in found.items() if array is not None}
 
 

@@ -1,177 +1,134 @@
-"""Boundaries as analytic surfaces: distance and normal at a grain, the list of grains near them, and the forces they exert."""
+"""Boundaries as analytic surfaces: the point of a surface that is nearest to a grain.
+
+All lengths are in quanta and double precision, so that overlaps, which are tiny differences of large numbers, are as exact as the
+grains' own positions and a grain that slides over a surface feels no kicks.
+"""
 
 from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.response import build_meeting, memory_type
-from sand_sim.engine.act import build_act, build_acts
-from sand_sim.engine.contact_list import listed_at
-from sand_sim.engine.kernel import kernel
-from sand_sim.engine.recipe import Recipe
-from sand_sim.precision import Precision
+from sand_sim.engine.recipe import CYLINDER, PLANE, ROUGH, SHELL, Recipe
 
-PLANE = 0
-CYLINDER = 1  # grains are inside
+KINDS = {PLANE: 0, CYLINDER: 1, SHELL: 2}
+NO_SIDE, NEAR_SIDE, BOTH_SIDES = 0, 1, 2  # how many sides of a shell answer at an end of its line
+_FAR = 1.0e18  # [quantum] where there is nothing to touch
+
+
+@wp.struct
+class Surface:
+    """One boundary surface.
+
+    A shell is a line in the half plane of distance from the axis and height along it, turned about the axis; it is thin and solid
+    both ways. Where the lines of two shells meet, only one of them answers at the common point, so that a seam is no rim.
+    """
+
+    kind: int
+    material: int
+    plunger: int  # index of the one that moves it, or -1
+    first: int  # its contacts are listed under partner numbers from here on
+    anchor: wp.vec3d  # [quantum] a point of the plane, or height zero on the axis
+    direction: wp.vec3d  # [1] the plane's normal towards the grains, or the axis
+    across: wp.vec3d  # [1] a unit vector at right angles to it
+    begin: wp.vec2d  # [quantum] of the line: distance from the axis, height
+    end: wp.vec2d  # [quantum]
+    beyond_begin: wp.vec2d  # [1] way of the line that goes on there, zero at a free rim
+    beyond_end: wp.vec2d  # [1]
+    answers_begin: int
+    answers_end: int
+    ball: wp.float64  # [quantum] radius of the virtual spheres, zero if smooth
+    spacing: wp.float64  # [quantum] of virtual spheres in a row, at most
+    row_spacing: wp.float64  # [quantum]
+    stagger: wp.float64  # [1] shift of every other row, in spacings
+    first_row: int  # of a plane, counted from the anchor
+    first_column: int
+    rows: int
+    columns: int  # in the longest row
 
 
 @cache
-def surface_type(precision: Precision) -> type:
-    """Warp struct of one boundary surface."""
-    real, vec3, whole3 = precision.real, precision.vec3, precision.whole3
+def build_nearest_on_shell() -> wp.Function:
+    """Warp function ``(wall, side, away) -> (distance [quantum], normal)`` for a shell.
 
-    @wp.struct
-    class Surface:
-        kind: int
-        anchor: whole3  # [quantum] a point of the plane, or of the cylinder's axis
-        direction: vec3  # [1] the plane's normal towards the grains, or the cylinder's axis
-        radius: real  # [m] of the cylinder
-        material: int
-
-    return Surface
-
-
-@cache
-def build_surface_at(precision: Precision) -> wp.Function:
-    """Warp function ``(surface, place, quantum) -> (distance from the grain's centre [m], normal towards the grain)``."""
-    real, vec3, whole4 = precision.real, precision.vec3, precision.whole4
-    surface = surface_type(precision)
+    Side 0 is the line in the grain's own half plane, side 1 that opposite, which a grain as wide as the hole touches, too.
+    """
+    zero, one, far = wp.float64(0.0), wp.float64(1.0), wp.float64(_FAR)
 
     @wp.func
-    def surface_at(wall: surface, place: whole4, quantum: real):
-        away = vec3(real(place[0] - wall.anchor[0]), real(place[1] - wall.anchor[1]), real(place[2] - wall.anchor[2])) * quantum
+    def nearest_on_shell(wall: Surface, side: int, away: wp.vec3d):
+        along = wp.dot(away, wall.direction)
+        radial = away - wall.direction * along
+        from_axis = wp.length(radial)
+        outward = wall.across
+        if from_axis > zero:
+            outward = radial / from_axis
+        if side == 1:
+            outward = -outward
+            from_axis = -from_axis
+        here = wp.vec2d(from_axis, along) - wall.begin
+        line = wall.end - wall.begin
+        share = wp.dot(here, line) / wp.dot(line, line)
+        apart = here - line * wp.clamp(share, zero, one)
+        distance = wp.length(apart)
+        way = wp.vec2d(-line[1], line[0]) / wp.length(line)
+        if distance > zero:
+            way = apart / distance
+        normal = outward * way[0] + wall.direction * way[1]
+        answers = int(wp.static(BOTH_SIDES))
+        beyond = wp.float64(0.0)
+        if share <= zero:
+            answers = wall.answers_begin
+            beyond = wp.dot(apart, wall.beyond_begin)
+        elif share >= one:
+            answers = wall.answers_end
+            beyond = wp.dot(apart, wall.beyond_end)
+        if beyond > zero or side >= answers:
+            distance = far
+        return distance, normal
+
+    return nearest_on_shell
+
+
+@cache
+def build_nearest(surfaces: frozenset[str]) -> wp.Function:
+    """Warp function ``(wall, side, away) -> (distance [quantum], normal)`` for the smooth surfaces of a recipe.
+
+    ``away`` is from the anchor to the grain's centre [quantum]; only shells have a side 1.
+    """
+    cylinder, shell, nearest_on_shell = CYLINDER in surfaces, SHELL in surfaces, build_nearest_on_shell()
+
+    @wp.func
+    def nearest(wall: Surface, side: int, away: wp.vec3d):
         along = wp.dot(away, wall.direction)
         distance = along
         normal = wall.direction
-        if wall.kind == wp.static(CYLINDER):
-            radial = away - wall.direction * along
-            length = wp.length(radial)
-            distance = wall.radius - length
-            normal = vec3(real(0.0))
-            if length > real(0.0):
-                normal = -radial / length
+        if wp.static(cylinder):
+            if wall.kind == wp.static(KINDS[CYLINDER]):
+                radial = away - wall.direction * along
+                from_axis = wp.length(radial)
+                distance = wall.begin[0] - from_axis
+                if from_axis > wp.float64(0.0):
+                    normal = -radial / from_axis
+        if wp.static(shell):
+            if wall.kind == wp.static(KINDS[SHELL]):
+                distance, normal = nearest_on_shell(wall, side, away)
         return distance, normal
 
-    return surface_at
+    return nearest
 
 
 @cache
-def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
-    """Kernel that counts or, ``filling``, lists the surfaces within reach of each grain."""
-    precision, history = recipe.precision, recipe.history
-    real, whole4, memory_vector = precision.real, precision.whole4, memory_type(recipe.contact, precision)
-    surface, surface_at = surface_type(precision), build_surface_at(precision)
+def build_surface_of(recipe: Recipe) -> wp.Function:
+    """Warp function ``(walls, partner) -> index of the surface`` that a contact is listed under."""
+    plain = not recipe.surfaces & {SHELL, ROUGH}
 
-    @kernel
-    def surface_search(
-        lane: int,
-        spans: wp.array(dtype=int),
-        stride: int,
-        place: wp.array(dtype=whole4),
-        walls: wp.array(dtype=surface),
-        quantum: real,
-        skin: real,
-        counts: wp.array(dtype=int),
-        starts: wp.array(dtype=int),
-        owner: wp.array(dtype=int),
-        partner: wp.array(dtype=int),
-        memory: wp.array(dtype=memory_vector),
-        came_from: wp.array(dtype=int),
-        old_starts: wp.array(dtype=int),
-        old_partner: wp.array(dtype=int),
-        old_memory: wp.array(dtype=memory_vector),
-    ):
-        for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
-            here = place[i]
-            found = int(0)
-            if wp.static(filling):
-                found = starts[i]
-            for wall in range(walls.shape[0]):
-                distance, _normal = surface_at(walls[wall], here, quantum)
-                if distance < real(here[3]) * quantum + skin:
-                    if wp.static(filling):
-                        owner[found] = i
-                        partner[found] = wall
-                        if wp.static(history):
-                            kept = memory_vector()
-                            old = listed_at(old_starts, old_partner, came_from[i], wall)
-                            if old >= 0:
-                                kept = old_memory[old]
-                            memory[found] = kept
-                    found += 1
-            if wp.static(not filling):
-                counts[i] = found
+    @wp.func
+    def surface_of(walls: wp.array(dtype=Surface), partner: int) -> int:
+        wall = partner
+        if wp.static(not plain):
+            wall = int(0)
+            while wall + 1 < walls.shape[0] and walls[wall + 1].first <= partner:
+                wall += 1
+        return wall
 
-    return surface_search
-
-
-@cache
-def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
-    """Kernel for the forces of surfaces on grains; a surface is flat for the law (R* is the grain's radius) and immovable."""
-    precision, rotation, materials = recipe.precision, recipe.rotation, recipe.materials
-    real, vec3, vec4, whole4 = precision.real, precision.vec3, precision.vec4, precision.whole4
-    types, memory_vector = recipe.contact.types(precision), memory_type(recipe.contact, precision)
-    surface, surface_at = surface_type(precision), build_surface_at(precision)
-    meeting, acts = build_meeting(precision), build_acts(recipe)
-    act, release = build_act(recipe, measuring)
-
-    @kernel
-    def surface_forces(
-        lane: int,
-        spans: wp.array(dtype=int),
-        stride: int,
-        owner: wp.array(dtype=int),
-        partner: wp.array(dtype=int),
-        place: wp.array(dtype=whole4),
-        motion: wp.array(dtype=vec4),
-        spin: wp.array(dtype=vec4),
-        material: wp.array(dtype=int),
-        table: wp.array(dtype=types.pair),
-        kinds: int,
-        quantum: real,
-        dt: real,
-        walls: wp.array(dtype=surface),
-        memory: wp.array(dtype=memory_vector),
-        force: wp.array(dtype=vec3),
-        couple: wp.array(dtype=vec4),
-        moment: wp.array(dtype=vec3),
-        deepest: wp.array(dtype=real),
-        energy: wp.array(dtype=real),
-    ):
-        for contact in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
-            i = owner[contact]
-            wall = walls[partner[contact]]
-            distance, normal = surface_at(wall, place[i], quantum)
-            radius = real(place[i][3]) * quantum
-            overlap = radius - distance
-            if acts(contact, overlap > real(0.0), memory):
-                of_i = motion[i]
-                velocity = vec3(of_i[0], of_i[1], of_i[2])
-                turning = vec3(real(0.0))
-                if wp.static(rotation):
-                    spin_i = spin[i]
-                    turning = vec3(spin_i[0], spin_i[1], spin_i[2])
-                    velocity -= wp.cross(turning, normal) * distance
-                met = meeting(normal, overlap, velocity, turning, radius, radius, of_i[3])
-                kind = int(0)
-                if wp.static(materials):
-                    kind = material[i]
-                act(
-                    contact,
-                    met,
-                    table[kind * kinds + wall.material],
-                    dt,
-                    overlap,
-                    lane,
-                    overlap / radius,
-                    memory,
-                    force,
-                    couple,
-                    moment,
-                    deepest,
-                    energy,
-                )
-            else:
-                release(contact, memory, force, couple, moment, energy)
-
-    return surface_forces
+    return surface_of

@@ -24,6 +24,12 @@ def check_scene(scene: Scene) -> None:
     for section, name, material in used:
         if material not in known:
             raise SceneError(f"{section}: '{name}' is of unknown material '{material}'; known are {', '.join(sorted(known))}")
+    names = [b.name for b in scene.boundaries]
+    for boundary in scene.boundaries:
+        if (boundary.drive or boundary.terrain) and names.count(boundary.name) > 1:
+            raise SceneError(
+                f"boundaries: '{boundary.name}' is the name of several; give the {boundary.kind} a 'name' of its own"
+            )
     _check_pairs(scene, known)
     for fill in scene.fills:
         if fill.height is not None and fill.height > fill.high[2] - fill.low[2]:

@@ -11,10 +11,10 @@ from sand_sim.precision import PRECISIONS
 from sand_sim.scene.checking import check_scene
 from sand_sim.scene.fields import Field
 from sand_sim.scene.reading_bodies import read_body
+from sand_sim.scene.reading_boundaries import read_boundary, read_corners
 from sand_sim.scene.reading_poses import read_pose
 from sand_sim.scene.shapes import SPHERE, TETRAHEDRON
 from sand_sim.scene.types import (
-    Boundary,
     Fill,
     Liquid,
     Material,
@@ -28,8 +28,6 @@ from sand_sim.scene.types import (
     Tool,
     Waypoint,
 )
-
-_SIDES = ("left", "right", "front", "back", "bottom", "top")
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -87,11 +85,11 @@ def read_scene(parsed: dict, folder: Path) -> Scene:
     scene = Scene(
         name=top.optional("name", Field.text, "scene"),
         gravity=top.optional("gravity", Field.vector, (0.0, 0.0, -9.81)),
-        domain=top.optional("domain", _corners, None),
+        domain=top.optional("domain", read_corners, None),
         materials=tuple(_material(name, entry) for name, entry in top["materials"].items()),
         pairs=tuple(_pair(entry) for entry in top["pairs"].entries()),
         fills=tuple(_fill(entry, folder) for entry in top["fills"].entries()) if "fills" in top else (),
-        boundaries=tuple(_boundary(entry) for entry in top["boundaries"].entries()) if "boundaries" in top else (),
+        boundaries=tuple(read_boundary(entry, folder) for entry in top["boundaries"].entries()) if "boundaries" in top else (),
         tools=tuple(_tool(name, entry) for name, entry in top["tools"].items()) if "tools" in top else (),
         bodies=tuple(read_body(name, entry, folder) for name, entry in top["bodies"].items()) if "bodies" in top else (),
         contact=top.optional("contact", _contact, ContactModel()),
@@ -127,14 +125,6 @@ def _pair(entry: Field) -> PairRule:
             name: entry[name].number(ask.above, ask.least, ask.most, ask.unit) for name, ask in ASKS.items() if name in entry
         },
     )
-
-
-def _corners(entry: Field) -> tuple:
-    entry.keys(("low", "high"), required=("low", "high"))
-    low, high = entry["low"].vector(), entry["high"].vector()
-    if not all(a < b for a, b in zip(low, high, strict=True)):
-        raise entry.refuse(f"'low' {list(low)} must lie below 'high' {list(high)} on every axis [m]")
-    return low, high
 
 
 def _size(entry: Field) -> SizeDistribution:
@@ -173,7 +163,7 @@ def _fill(entry: Field, folder: Path) -> Fill:
         raise entry.refuse("give exactly one of 'count', 'height' and 'file'")
     if ways != ["file"] and not ("radius" in entry and "region" in entry):
         raise entry.refuse("the fields 'radius' and 'region' are needed unless the grains come from a file")
-    low, high = entry.optional("region", _corners, (None, None))
+    low, high = entry.optional("region", read_corners, (None, None))
     return Fill(
         name=entry.optional("name", Field.text, entry.path),
         material=entry["material"].text(),
@@ -187,24 +177,6 @@ def _fill(entry: Field, folder: Path) -> Fill:
         velocity=entry.optional("velocity", Field.vector, (0.0, 0.0, 0.0)),
         seed=entry.optional("seed", lambda f: f.whole(0), 0),
     )
-
-
-def _boundary(entry: Field) -> Boundary:
-    kind = entry.keys(
-        ("type", "material", "name", "point", "normal", "axis", "radius", "low", "high", "open"), ("type", "material")
-    )["type"].choice(("plane", "box", "cylinder"))
-    needed = {"plane": ("point", "normal"), "box": ("low", "high"), "cylinder": ("point", "axis", "radius")}[kind]
-    optional = ("open",) if kind == "box" else ()
-    entry.keys(("type", "material", "name", *needed, *optional), needed)
-    common = {"kind": kind, "material": entry["material"].text(), "name": entry.optional("name", Field.text, kind)}
-    if kind == "plane":
-        return Boundary(**common, point=entry["point"].vector(), direction=entry["normal"].direction())
-    if kind == "cylinder":
-        radius = entry["radius"].number(above=0.0, unit="m")
-        return Boundary(**common, point=entry["point"].vector(), direction=entry["axis"].direction(), radius=radius)
-    low, high = _corners(Field({"low": entry.value["low"], "high": entry.value["high"]}, entry.path))
-    sides = tuple(side.choice(_SIDES) for side in entry["open"].entries()) if "open" in entry else ()
-    return Boundary(**common, low=low, high=high, open_sides=sides)
 
 
 def _tool(name: str, entry: Field) -> Tool:

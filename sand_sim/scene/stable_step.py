@@ -105,24 +105,27 @@ def particles_touched(grain: float, particle: float, spacing: float, overlap: fl
 
 
 def network_steps(scene: Scene, smallest: dict[str, float], spacings: Sequence[float], depth: float) -> Iterator[float]:
-    """Largest stable step of the smallest grains among their like, at walls and at the particles of each tool [s].
+    """Largest stable step of the smallest grains among their like, at walls and at the particles of tools and rough walls [s].
 
     Args:
         scene: materials, pairs, boundaries, tools.
         smallest: smallest grain radius of each grain material [m].
-        spacings: of the particles of each tool, in the order of the scene [m].
+        spacings: of the particles of each tool, then of each terrain, in the order of the scene [m].
         depth: overlap over radius up to which contacts shall be stable [1].
     """
     named = {m.name: m for m in scene.materials}
     rotation = scene.contact.rotation
+    sampled = [(tool.material, tool.particle_radius) for tool in scene.tools]
+    sampled += [(wall.material, wall.terrain.particle_radius) for wall in scene.boundaries if wall.terrain]
+    layers = [(*body, spacing) for body, spacing in zip(sampled, spacings, strict=True)]
+    layers += [(wall.material, wall.rough.radius, wall.rough.spacing) for wall in scene.boundaries if wall.rough]
     for grain, radius in smallest.items():
         mass, overlap = named[grain].density * 4.0 / 3.0 * math.pi * radius**3, depth * radius
         meetings = [(other, 0.5 * radius, 0.5 * mass, grain_share(rotation)) for other in smallest]
         meetings += [(wall.material, radius, mass, surface_share(rotation)) for wall in scene.boundaries]
-        for tool, spacing in zip(scene.tools, spacings, strict=True):
-            particle = tool.particle_radius
+        for material, particle, spacing in layers:
             touched = max(SURFACE_CONTACTS, particles_touched(radius, particle, spacing, overlap))
-            meetings.append((tool.material, radius * particle / (radius + particle), mass, surface_share(rotation, touched)))
+            meetings.append((material, radius * particle / (radius + particle), mass, surface_share(rotation, touched)))
         for other, effective_radius, reduced_mass, share in meetings:
             pair = pair_numbers(scene, grain, other)
             stiffness, damping = spring_and_dashpot(scene.contact, pair, effective_radius, reduced_mass, overlap)

@@ -85,7 +85,8 @@ class TimeStep:
 def fastest_speed(scene: Scene, height: float, given: float) -> float:
     """Relative speed of the hardest contact to expect [m/s]: free fall from a height [m], grains' own speeds [m/s], tools."""
     fall = float(np.sqrt(2.0 * np.linalg.norm(scene.gravity) * height))
-    tools = max((tool.max_speed for tool in scene.tools), default=0.0)
+    plungers = [max(abs(b.drive.velocity), b.drive.max_speed) for b in scene.boundaries if b.drive]
+    tools = max([*plungers, *(tool.max_speed for tool in scene.tools)], default=0.0)
     return max(fall + 2.0 * given, tools + given, 1e-3)
 
 
@@ -98,7 +99,7 @@ def choose_time_step(
         scene: materials and the step asked for.
         smallest: smallest grain radius of each grain material [m].
         speed: fastest relative speed to expect [m/s].
-        spacings: of the particles of each tool, in the order of the scene [m].
+        spacings: of the particles of each tool, then of each terrain, in the order of the scene [m].
         depth: overlap over radius up to which contacts shall be stable [1].
 
     Raises:

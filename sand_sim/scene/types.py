@@ -1,6 +1,7 @@
 """Border 1, the Scene: everything that never changes while a world runs. SI units, REP-103 axes (x forward, z up)."""
 
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -73,26 +74,68 @@ class Fill:
 
 
 @dataclass(frozen=True)
-class Boundary:
-    """A fixed wall: ``plane`` (half space), ``box`` (grains inside, sides may be open) or ``cylinder`` (grains inside)."""
-
-    kind: str
-    material: str
-    name: str
-    point: Vector = (0.0, 0.0, 0.0)  # [m] of the plane, or on the cylinder's axis
-    direction: Vector = (0.0, 0.0, 1.0)  # [1] plane normal towards the grains, or cylinder axis
-    radius: float = 0.0  # [m]
-    low: Vector | None = None  # [m]
-    high: Vector | None = None  # [m]
-    open_sides: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class Pose:
     """Position [m] and orientation (unit quaternion, x y z w) of a frame in the world frame."""
 
     position: Vector = (0.0, 0.0, 0.0)
     orientation: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Rough:
+    """Virtual spheres that make a boundary rough; their centres lie on its surface."""
+
+    radius: float  # [m]
+    spacing: float  # [m] of neighbours in a row
+    lattice: str = "triangular"  # or square; on surfaces of revolution the rows are rings
+
+
+@dataclass(frozen=True)
+class Drive:
+    """How a plunger moves along its normal from time zero on: at a velocity, or as a mass that is pressed by a force."""
+
+    velocity: float = 0.0  # [m/s] towards the grains if positive; not used with a force
+    force: float | None = None  # [N] towards the grains, all but that of the grains themselves
+    mass: float | None = None  # [kg] that the force moves; None means that of all grains
+    max_speed: float = 0.0  # [m/s] of the mass, either way
+    travel: float = inf  # [m] farthest from where it starts, either way; there it stops
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """Ground made of particles sampled from a mesh or from a grid of heights, in the frame of ``pose``."""
+
+    particle_radius: float  # [m]
+    mesh: str = ""
+    heights: Path | None = None
+    spacing: float = 0.0  # [m] of the grid
+    scale: float = 1.0  # [m per unit] of the mesh, or of the heights
+    pose: Pose = Pose()
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """A wall.
+
+    ``plane`` (half space), ``box`` (grains inside, sides may be open), ``cylinder`` (grains inside if it has no end, solid both
+    ways if it has a height), ``cone`` and ``hole_plate`` (with a hole about the axis, solid both ways), ``plunger`` (a plane or
+    disc that moves along its normal) or ``terrain``.
+    """
+
+    kind: str
+    material: str
+    name: str
+    point: Vector = (0.0, 0.0, 0.0)  # [m] of the plane, or on the axis: foot of the cylinder, middle of the hole or disc
+    direction: Vector = (0.0, 0.0, 1.0)  # [1] plane normal towards the grains, or axis; that of a cone points to its wide end
+    radius: float = 0.0  # [m] of the cylinder, of the wide end, of the plate; zero for a plunger without edge
+    hole_radius: float = 0.0  # [m]
+    height: float = 0.0  # [m] along the axis; zero for a cylinder without end
+    low: Vector | None = None  # [m]
+    high: Vector | None = None  # [m]
+    open_sides: tuple[str, ...] = ()
+    rough: Rough | None = None
+    drive: Drive | None = None
+    terrain: Terrain | None = None
 
 
 @dataclass(frozen=True)

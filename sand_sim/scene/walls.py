@@ -1,10 +1,10 @@
-"""Boundaries of a scene taken apart into planes and cylinders, with their distances on the host."""
+"""Boundaries of a scene taken apart into planes, cylinders and surfaces of revolution, with their distances on the host."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from sand_sim.scene.types import Boundary, unit
+from sand_sim.scene.types import Boundary, Drive, Rough, unit
 
 _BOX_SIDES = {
     "left": (1, False),  # +y is left, +x is forward (REP-103)
@@ -21,12 +21,15 @@ class Wall:
     """One analytic surface.
 
     Attributes:
-        kind: ``plane`` or ``cylinder`` (grains inside).
+        kind: ``plane``, ``cylinder`` (without end, grains inside) or ``shell``, a line turned about an axis.
         name: of the boundary, with the side of a box.
         material: name.
         point: of the plane or on the axis, shape (3,) [m].
-        direction: plane normal towards the grains or cylinder axis, unit, shape (3,).
+        direction: plane normal towards the grains or axis, unit, shape (3,).
         radius: of the cylinder [m].
+        begin, end: of the shell's line, distance from the axis and height above ``point``, shape (2,) [m].
+        rough: its virtual spheres.
+        drive: how it moves along ``direction``.
     """
 
     kind: str
@@ -35,26 +38,68 @@ class Wall:
     point: np.ndarray
     direction: np.ndarray
     radius: float = 0.0
+    begin: np.ndarray | None = None
+    end: np.ndarray | None = None
+    rough: Rough | None = None
+    drive: Drive | None = None
 
     def distance(self, position: np.ndarray) -> np.ndarray:
-        """Distance of points, shape (n, 3) [m], from the surface, shape (n,) [m]; positive where grains belong."""
+        """Distance of points, shape (n, 3) [m], from the surface, shape (n,) [m]; positive where a fill may put grains.
+
+        Those are both sides of plates and discs, but only the inner side of cylinders and cones.
+        """
         away = position - self.point
         along = away @ self.direction
+        thickness = self.rough.radius if self.rough else 0.0
         if self.kind == "plane":
-            return along
-        return self.radius - np.linalg.norm(away - along[:, None] * self.direction, axis=1)
+            return along - thickness
+        from_axis = np.linalg.norm(away - along[:, None] * self.direction, axis=1)
+        if self.kind == "cylinder":
+            return self.radius - from_axis - thickness
+        line = self.end - self.begin
+        here = np.column_stack([from_axis, along]) - self.begin
+        share = np.clip(here @ line / (line @ line), 0.0, 1.0)
+        distance = np.linalg.norm(here - share[:, None] * line, axis=1)
+        if line[1] != 0.0:
+            level = here[:, 1] / line[1]
+            outside = (level > 0.0) & (level < 1.0) & (here[:, 0] > level * line[0])
+            distance = np.where(outside, -distance, distance)
+        return distance - thickness
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Box around a shell, shape (2, 3) [m]."""
+        middles = self.point + np.array([self.begin[1], self.end[1]])[:, None] * self.direction
+        reach = max(self.begin[0], self.end[0]) * np.sqrt(1.0 - np.minimum(self.direction**2, 1.0))
+        return np.array([middles.min(axis=0) - reach, middles.max(axis=0) + reach])
 
 
 def walls_of(boundary: Boundary) -> list[Wall]:
-    """The surfaces of a boundary; a box gives one plane for each closed side."""
-    if boundary.kind != "box":
-        point = np.asarray(boundary.point, float)
-        return [Wall(boundary.kind, boundary.name, boundary.material, point, unit(boundary.direction), boundary.radius)]
+    """The analytic surfaces of a boundary; a box gives one plane for each closed side, a terrain none."""
+    if boundary.kind == "terrain":
+        return []
+    if boundary.kind == "box":
+        return _sides(boundary)
+    shape = {"kind": "shell"}
+    if boundary.kind in ("plane", "plunger") and not boundary.radius:
+        shape = {"kind": "plane"}
+    elif boundary.kind == "cylinder" and not boundary.height:
+        shape = {"kind": "cylinder", "radius": boundary.radius}
+    else:
+        inner = boundary.radius if boundary.kind == "cylinder" else boundary.hole_radius
+        shape |= {"begin": np.array([inner, 0.0]), "end": np.array([boundary.radius, boundary.height])}
+    place = {"point": np.asarray(boundary.point, float), "direction": unit(boundary.direction)}
+    common = {"name": boundary.name, "material": boundary.material, "rough": boundary.rough, "drive": boundary.drive}
+    return [Wall(**shape, **place, **common)]
+
+
+def _sides(boundary: Boundary) -> list[Wall]:
     walls = []
     for side, (axis, lower) in _BOX_SIDES.items():
         if side not in boundary.open_sides:
             normal = np.zeros(3)
             normal[axis] = 1.0 if lower else -1.0
             point = np.asarray(boundary.low if lower else boundary.high, float)
-            walls.append(Wall("plane", f"{boundary.name}/{side}", boundary.material, point, normal))
+            name = f"{boundary.name}/{side}"
+            walls.append(Wall("plane", name, boundary.material, point, normal, rough=boundary.rough))
     return walls

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+import trimesh
 
 from sand_sim.border import Observation
 from sand_sim.sinks.colours import colour_by_speed
 from sand_sim.sinks.viewer import open_viewer
+from sand_sim.sinks.wall_mesh import shell_mesh
 from sand_sim.world import World
 
 _TIMELINE = "sim_time"
@@ -31,6 +33,7 @@ class RerunSink:
     def __init__(self, world: World, path: Path | None, view: bool = False, particles: bool = False):
         self._fastest = max((tool.max_speed for tool in world.scene.tools), default=1.0)
         self._identity = np.zeros(0, int)
+        self._plungers = {wall.name for wall in world.assembly.walls if wall.drive}
         self._recording = rr.RecordingStream("sand_sim", recording_id=None)
         sinks = []
         if path is not None:
@@ -57,6 +60,10 @@ class RerunSink:
         if not np.array_equal(grains.identity, self._identity):
             self._identity = grains.identity
             recording.log("world/grains", rr.Points3D.from_fields(radii=grains.radius.astype(np.float32)))
+        for wall in observation.walls:
+            if wall.name in self._plungers:
+                recording.log(f"world/walls/{wall.name}", rr.Transform3D(translation=wall.position))
+                recording.log(f"force/{wall.name}", rr.Scalars(float(np.linalg.norm(wall.force))))
         for tool in observation.tools:
             pose = rr.Transform3D(translation=tool.position, quaternion=rr.Quaternion(xyzw=tool.orientation))
             recording.log(f"world/tools/{tool.name}", pose)
@@ -89,18 +96,32 @@ class RerunSink:
             if boundary.kind == "box":
                 box = rr.Boxes3D(mins=[boundary.low], sizes=[np.subtract(boundary.high, boundary.low)], colors=[[150, 150, 160]])
                 recording.log(f"world/walls/{boundary.name}", box, static=True)
+        for wall in world.assembly.walls:
+            if wall.kind == "shell":
+                corners, triangles = shell_mesh(wall)
+                mesh = rr.Mesh3D(vertex_positions=corners, triangle_indices=triangles, albedo_factor=[150, 150, 160, 90])
+                recording.log(f"world/walls/{wall.name}", mesh, static=True)
+                if not wall.drive:
+                    recording.log(f"world/walls/{wall.name}", rr.Transform3D(translation=wall.point), static=True)
+        for ground in world.assembly.grounds:
+            mesh = _flat_mesh(ground.mesh, ground.place, [150, 135, 110, 255])
+            recording.log(f"world/walls/{ground.name}", mesh, static=True)
         for model in world.tools:
             name = f"world/tools/{model.tool.name}"
-            corners = np.asarray(model.mesh.triangles, np.float32)  # each face has its own, so that edges look sharp
-            mesh = rr.Mesh3D(
-                vertex_positions=corners.reshape(-1, 3),
-                vertex_normals=np.repeat(np.asarray(model.mesh.face_normals, np.float32), 3, axis=0),
-                albedo_factor=[140, 150, 165, 255],
-            )
+            mesh = _flat_mesh(model.mesh, np.zeros(3), [140, 150, 165, 255])
             recording.log(f"{name}/mesh", mesh, static=True)
             if particles:
                 points = rr.Points3D(model.body.points.astype(np.float32), radii=model.body.radius, colors=[[90, 120, 190]])
                 recording.log(f"{name}/particles", points, static=True)
+
+
+def _flat_mesh(mesh: trimesh.Trimesh, place: np.ndarray, colour: list[int]) -> rr.Mesh3D:
+    """A mesh whose faces each have corners of their own, so that edges look sharp."""
+    return rr.Mesh3D(
+        vertex_positions=(np.asarray(mesh.triangles) + place).reshape(-1, 3).astype(np.float32),
+        vertex_normals=np.repeat(np.asarray(mesh.face_normals, np.float32), 3, axis=0),
+        albedo_factor=colour,
+    )
 
 
 def _blueprint(world: World) -> rrb.Blueprint:

@@ -47,6 +47,7 @@ class RunLog:
             "deepest": health.deepest,
             "kinetic": health.kinetic,
             "dissipated": health.dissipated,
+            "momentum_residual": health.momentum_residual,
         }
         for tool in observation.tools:
             row[f"{tool.name}.position"] = tool.position
@@ -54,8 +55,15 @@ class RunLog:
             row[f"{tool.name}.force"] = tool.world_force
             row[f"{tool.name}.torque"] = tool.torque
             row[f"{tool.name}.carried"] = tool.carried
+        for wall in observation.walls:
+            if wall.name in self._plungers:
+                row[f"wall.{wall.name}.position"], row[f"wall.{wall.name}.force"] = wall.position, wall.force
         self.rows.append(row)
         self.last = observation
+
+    @property
+    def _plungers(self) -> set[str]:
+        return {boundary.name for boundary in self.scene.boundaries if boundary.drive}
 
     @property
     def real_time_factor(self) -> float:
@@ -81,6 +89,7 @@ class RunLog:
             "wall_s": columns["wall"][-1],
             "real_time_factor": self.real_time_factor,
             "contacts": health.contacts,
+            "largest_momentum_residual": np.nanmax(columns["momentum_residual"], initial=0.0),
             "largest_overlap_over_radius": health.deepest,
             "energy_J": energies,
             "doubts": [*health.doubts, *([self.fault] if self.fault else [])],

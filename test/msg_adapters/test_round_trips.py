@@ -96,7 +96,7 @@ def test_large_clouds_do_not_go_byte_by_byte():
 
 @pytest.mark.parametrize("doubts", [(), ("overlap reached 12 % of a radius",)])
 def test_health(doubts):
-    health = Health(1e-5, 1.0, 0.02, 1.0, 2.0, 3.0, 4.0, 5.0, 0.5, 123, 4, doubts)
+    health = Health(1e-5, 1.0, 0.02, 1.0, 2.0, 3.0, 4.0, 5.0, 1e-9, 0.5, 123, 4, doubts)
     message = health_to_diagnostics(health, 1.0, "sand_sim: world", "cpu", {"more": "1"})
     status = message.status[0]
     assert status.level == (DiagnosticStatus.WARN if doubts else DiagnosticStatus.OK)

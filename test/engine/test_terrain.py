@@ -1,0 +1,128 @@
+"""Terrain: grains roll into valleys and rest there, whatever the file the ground came from."""
+
+import numpy as np
+import pytest
+from PIL import Image
+from scenes import SceneMaker
+
+from sand_sim import SceneError, World, read_scene
+
+GRAVITY, RADIUS, SPACING = 9.81, 0.006, 0.005
+ROWS, COLUMNS = 21, 41  # 0.1 m along y, 0.2 m along x
+
+
+def valley():
+    """Heights [m] that fall towards x = 0.1 and, more gently, towards y = 0.05; rows along y, columns along x."""
+    y, x = np.mgrid[:ROWS, :COLUMNS] * SPACING
+    return 0.03 + 0.25 * np.abs(x - 0.1) + 0.15 * np.abs(y - 0.05)
+
+
+@pytest.fixture
+def make_ground(tmp_path):
+    """``make_ground(position, ...)`` builds a world of grains over a terrain called ``ground``."""
+
+    def make(position, terrain, **further):
+        entry = {"type": "terrain", "name": "ground", "material": "wall", "particle_radius": 0.003, "spacing": SPACING} | terrain
+        entry = {name: value for name, value in entry.items() if value is not None}
+        material = {"density": 2500.0, "young": 1e7, "poisson": 0.25}
+        further = {"gravity": [0.0, 0.0, -GRAVITY], "restitution": 0.3, "friction": 0.5, "material": material} | further
+        scene = SceneMaker(tmp_path).scene(position, RADIUS, boundaries=[entry], threads=1, **further)
+        return World(read_scene(scene, tmp_path))
+
+    return make
+
+
+def write_heights(folder, kind):
+    """The valley as a file, and the scale of its heights."""
+    path = folder / f"valley.{kind}"
+    if kind == "npz":
+        np.savez(path, heights=valley())
+        return path.name, 1.0
+    if kind == "csv":
+        np.savetxt(path, 1000.0 * valley(), delimiter=",")
+        return path.name, 0.001
+    levels = np.rint(valley()[::-1] / 0.1 * 65535.0).astype(np.uint16)  # the upper edge of a map is far along y
+    Image.fromarray(levels).save(path)
+    return path.name, 0.1
+
+
+@pytest.mark.parametrize("kind", ["npz", "csv", "png"])
+def test_grain_rolls_into_the_valley_and_rests(make_ground, tmp_path, kind):
+    file, scale = write_heights(tmp_path, kind)
+    world = make_ground(
+        [[0.04, 0.03, 0.075]],
+        {"heights": file, "scale": scale},
+        contact={"rolling": "spring"},
+        numbers={"rolling_friction": 0.05},
+    )
+    for _ in range(30):
+        world.step(round(0.1 / world.time_step))
+        observation = world.observe()
+        if observation.health.fastest < 1e-4 and world.time > 0.5:
+            break
+    x, y, z = observation.grains.position[0]
+    assert abs(x - 0.1) < 0.01
+    assert abs(y - 0.05) < 0.015
+    assert 0.03 + RADIUS < z < 0.03 + RADIUS + 0.008
+    weight = observation.grains.mass[0] * GRAVITY
+    assert observation.wall("ground").force == pytest.approx([0.0, 0.0, -weight], abs=5e-3 * weight)
+    assert observation.wall("ground").position == pytest.approx([0.1, 0.05, valley().max() / 2 + 0.015], abs=1e-3)
+    assert not observation.tools
+
+
+def test_every_file_gives_the_same_ground(make_ground, tmp_path):
+    """An uneven ground, so that turned or mirrored grids would show."""
+    grounds = []
+    for kind in ("npz", "csv", "png"):
+        file, scale = write_heights(tmp_path, kind)
+        grounds.append(make_ground([[0.1, 0.05, 0.2]], {"heights": file, "scale": scale}).assembly.grounds[0])
+    for ground in grounds:
+        assert ground.mesh.vertices == pytest.approx(grounds[0].mesh.vertices, abs=2e-6)
+    points = grounds[0].body.points + grounds[0].place
+    below = 0.03 + 0.25 * np.abs(points[:, 0] - 0.1) + 0.15 * np.abs(points[:, 1] - 0.05)
+    assert np.abs(points[:, 2] - below).max() < 1e-3
+    at = np.array([[0.05, 0.02, 0.0], [0.05, 0.02, 0.1]])
+    assert np.sign(grounds[0].distance(at)).tolist() == [-1.0, 1.0]
+
+
+def test_mesh_terrain_lies_at_its_pose(make_ground, tmp_path):
+    """A block whose upper face is brought level by the pose carries a grain."""
+    import trimesh
+
+    trimesh.creation.box((60.0, 40.0, 10.0)).export(tmp_path / "block.stl")
+    pose = {"position": [1.0, 2.0, 3.0], "rpy": [np.pi / 2, 0.0, 0.0]}
+    terrain = {"mesh": "block.stl", "scale": 0.001, "pose": pose, "spacing": None}
+    world = make_ground(
+        [[1.0, 2.0, 3.0 + 0.02 + 0.003 + RADIUS]], terrain, contact={"rolling": "spring"}, numbers={"rolling_friction": 0.3}
+    )
+    world.step(round(0.3 / world.time_step))
+    observation = world.observe()
+    weight = observation.grains.mass[0] * GRAVITY
+    assert observation.grains.position[0] == pytest.approx([1.0, 2.0, 3.0 + 0.02 + 0.003 + RADIUS], abs=2e-3)
+    assert observation.wall("ground").force == pytest.approx([0.0, 0.0, -weight], abs=5e-3 * weight)
+    assert observation.health.tool_work == 0.0
+
+
+@pytest.mark.parametrize(
+    ("write", "named"),
+    [
+        (lambda path: None, "boundaries: heights of terrain 'ground': ground.npz cannot be read"),
+        (lambda path: path.write_bytes(b"no zip"), "ground.npz is not a readable npz file"),
+        (lambda path: np.savez(path, ground=valley()), "ground.npz has no array 'heights'; it has ground"),
+        (lambda path: np.savez(path, heights=np.ones(4)), "ground.npz must hold at least 2 rows of 2 heights, got shape (4,)"),
+        (lambda path: np.savez(path, heights=np.full((2, 2), np.nan)), "ground.npz has heights that are not finite"),
+    ],
+)
+def test_bad_heights_are_refused(make_ground, tmp_path, write, named):
+    write(tmp_path / "ground.npz")
+    with pytest.raises(SceneError) as caught:
+        make_ground([[0, 0, 1]], {"heights": "ground.npz"})
+    assert named in str(caught.value)
+
+
+def test_coloured_pictures_and_missing_meshes_are_refused(make_ground, tmp_path):
+    Image.new("RGB", (4, 4)).save(tmp_path / "ground.png")
+    with pytest.raises(SceneError, match="must be a grey picture"):
+        make_ground([[0, 0, 1]], {"heights": "ground.png"})
+    with pytest.raises(SceneError, match=r"boundaries: mesh of terrain 'ground': mesh 'rock.stl': there is no file"):
+        make_ground([[0, 0, 1]], {"mesh": "rock.stl", "spacing": None})
