@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from kernel_source import source
 from scenes import record
+from warp._src.context import ModuleBuilder
 
 from sand_sim import World, read_scene
 from sand_sim.engine.recipe import Recipe
@@ -232,7 +232,7 @@ def test_grain_wider_than_the_hole_sits_in_it(make_world):
     assert observation.health.fastest < 1e-6
 
 
-HOPPER = {"bin": 0.03, "hole": 0.016, "grain": 0.0025}
+HOPPER = {"bin": 0.035, "hole": 0.016, "grain": 0.0025}
 
 
 def hopper(friction=0.4, count=120, young=5e6, **further):
@@ -295,24 +295,19 @@ def test_hopper_runs_empty_and_nothing_passes_its_walls(tmp_path, shape, young):
     assert observation.wall("gate").position == pytest.approx([0.0, 0.0, -0.11])
 
 
-def rate(rows, number, low, high):
-    """Grains per second while between two shares of them have passed."""
-    chosen = (rows[:, 1] > low * number) & (rows[:, 1] < high * number)
-    return np.polyfit(*rows[chosen].T, 1)[0]
-
-
 @pytest.mark.slow
 def test_hopper_flows_evenly_whatever_the_head(tmp_path):
-    """As long as the bed is deeper than the hole is wide the rate is constant.
+    """While the head falls to a third the count stays on a straight line to 3 %; a liquid's would leave it by 5 %.
 
-    It falls with friction and is what Beverloo's law allows, ``C rho_b sqrt(g) (D - k d)^2.5``.
+    The rate falls with friction and is what Beverloo's law allows, ``C rho_b sqrt(g) (D - k d)^2.5``.
     """
     number, rates = 2000, {}
     for friction in (0.2, 0.6):
-        rows, _ = discharge(hopper(friction, number, 1e7), tmp_path, 0.8, 160)
-        rates[friction] = rate(rows, number, 0.1, 0.5)
-    early, late = rate(rows, number, 0.1, 0.3), rate(rows, number, 0.3, 0.5)
-    assert late == pytest.approx(early, rel=0.05)
+        rows, _ = discharge(hopper(friction, number, 1e7), tmp_path, 1.1, 220)
+        time, passed = rows[(rows[:, 1] > 0.1 * number) & (rows[:, 1] < 0.7 * number)].T
+        line = np.polyfit(time, passed, 1)
+        rates[friction] = line[0]
+        assert np.abs(np.polyval(line, time) - passed).max() < 0.03 * np.ptp(passed)
     assert rates[0.6] < 0.95 * rates[0.2]
     diameter, mass = 2.0 * HOPPER["grain"], 2500.0 * 4.0 / 3.0 * np.pi * HOPPER["grain"] ** 3
     reduced = [(2.0 * HOPPER["hole"] - k * diameter) ** 2.5 for k in (1.5, 1.3)]
@@ -334,3 +329,9 @@ def test_kernels_know_only_the_walls_there_are(make_world):
         assert "nearest_on_shell" in much
         assert "sphere_at" in much
         assert len(little) < 0.75 * len(much)
+
+
+def source(kernel):
+    """What Warp would compile."""
+    module = kernel.module
+    return ModuleBuilder(module, module.options, hasher=module.hashers[next(iter(module.hashers))]).codegen("cpu")
