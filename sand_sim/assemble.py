@@ -169,12 +169,12 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         lattice,
         table,
         make_surfaces(walls, order, lattice, float(table.radius.min())),
-        make_plungers(walls, float(table.mass[table.lone].sum() + table.bodies.mass.sum())),
         [ToolBody(tool.body.points, tool.body.radius, order.index(tool.tool.material)) for tool in tools]
         + [ToolBody(ground.body.points, ground.body.radius, order.index(ground.material)) for ground in grounds],
         pairs,
         device.lanes,
         device.name,
+        make_plungers(walls, float(table.mass[table.lone].sum() + table.bodies.mass.sum())),
     )
     numbers, solver = [fill.grains for fill in fills], ExplicitDem(arrays, device)
     return Assembly(

@@ -55,9 +55,7 @@ def find_coarseness(assembly: Assembly) -> tuple[str, ...]:
 def _resolution(assembly: Assembly) -> float:
     """Rounding of the distance between a grain and what it touches [m]."""
     lattice, epsilon = assembly.lattice, assembly.recipe.precision.epsilon
-    oblique = [wall for wall in assembly.walls if wall.kind != "plane" or np.count_nonzero(wall.direction) > 1]
-    reach = 0.5 * float(np.linalg.norm(lattice.high - lattice.low)) if oblique else 0.0
-    return max([lattice.quantum, epsilon * reach, *(epsilon * tool.extent for tool in assembly.tools)])
+    return max([lattice.quantum, *(epsilon * model.extent for model in (*assembly.tools, *assembly.grounds))])
 
 
 def _smallest_overlap(assembly: Assembly) -> float:

@@ -53,6 +53,7 @@ class World:
         self._settle(progress)
         self._strike_off()
         self._solver.begin()
+        self._solver.engage_plungers()
         self._start = start_energy(self.assembly)
         tools = self._solver.arrays.tools
         self._observed_steps, self._observed_wrench = 0, tools.wrench.numpy().copy() if tools else None

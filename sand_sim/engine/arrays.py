@@ -1,5 +1,6 @@
 """All arrays of an explicit DEM world, and only those that its scene needs."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,11 +57,11 @@ class DemArrays:
         lattice: the domain.
         table: the grains.
         walls: ``Surface`` structs.
-        drives: ``Plunger`` structs of those that move.
         bodies: tools.
         pairs: ``MaterialPair`` structs, one row per material.
         lanes: of the device.
         device: Warp device.
+        drives: ``Plunger`` structs of the walls that move, in their order.
     """
 
     def __init__(
@@ -70,11 +71,11 @@ class DemArrays:
         lattice: Lattice,
         table: GrainTable,
         walls: list,
-        drives: list,
         bodies: list[ToolBody],
         pairs: list,
         lanes: int,
         device: str,
+        drives: Sequence = (),
     ):
         self.recipe, self.setting, self.lattice, self.lanes, self.device = recipe, setting, lattice, lanes, device
         precision, number = recipe.precision, len(table)
@@ -107,7 +108,7 @@ class DemArrays:
         self.pair_list = self._contact_list(_FIRST_PAIRS * number)
         self.walls = wp.array(walls, dtype=Surface, device=device) if walls else None
         self.wall_list = self._contact_list(number) if walls else None
-        self.plungers = Plungers(drives, device) if drives else None
+        self.plungers = Plungers(list(drives), device) if drives else None
         self.plunger_states = self.plungers.states if drives else None
         farthest = float(table.radius.max()) + setting.listing_gap
         self.tools = Tools(bodies, farthest, precision, device) if bodies else None

@@ -80,11 +80,14 @@ class ExplicitDem:
         self.renew_lists()
         arrays.flags.steps_done.zero_()
         arrays.deepest.zero_()
-        if arrays.plungers:
-            arrays.plungers.engage()
         if arrays.tools:
             for sum_so_far in (arrays.tools.wrench, arrays.tools.impulse, arrays.tools.work):
                 sum_so_far.zero_()
+
+    def engage_plungers(self) -> None:
+        """Let plungers move from now on."""
+        if self.arrays.plungers:
+            self.arrays.plungers.engage()
 
     def renew_lists(self) -> None:
         """Make the contact lists anew where they are no longer valid, as the next step would."""

@@ -297,7 +297,7 @@ def test_hopper_runs_empty_and_nothing_passes_its_walls(tmp_path, shape, young):
 
 @pytest.mark.slow
 def test_hopper_flows_evenly_whatever_the_head(tmp_path):
-    """While the head falls to a third the count stays on a straight line to 3 %; a liquid's would leave it by 5 %.
+    """While the head falls to a third the count stays on a straight line to 3 %; a liquid's would leave it by 4 %.
 
     The rate falls with friction and is what Beverloo's law allows, ``C rho_b sqrt(g) (D - k d)^2.5``.
     """
