@@ -157,7 +157,7 @@ def measure_cost(assembly: Assembly) -> float:
     recipe: Recipe = replace(assembly.recipe, materials=False)
     device = assembly.solver.device
     sample = DemArrays(
-        recipe, replace(setting, gravity=np.zeros(3)), lattice, table, [], [], [], assembly.pair_table, device.lanes, device.name
+        recipe, replace(setting, gravity=np.zeros(3)), lattice, table, [], [], assembly.pair_table, device.lanes, device.name
     )
     solver = ExplicitDem(sample, device)
     solver.run(2)

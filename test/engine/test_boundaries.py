@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from kernel_source import source
 from scenes import record
-from warp._src.context import ModuleBuilder
 
 from sand_sim import World, read_scene
 from sand_sim.engine.recipe import Recipe
@@ -329,9 +329,3 @@ def test_kernels_know_only_the_walls_there_are(make_world):
         assert "nearest_on_shell" in much
         assert "sphere_at" in much
         assert len(little) < 0.75 * len(much)
-
-
-def source(kernel):
-    """What Warp would compile."""
-    module = kernel.module
-    return ModuleBuilder(module, module.options, hasher=module.hashers[next(iter(module.hashers))]).codegen("cpu")
