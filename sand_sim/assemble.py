@@ -9,7 +9,7 @@ import trimesh
 
 from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_body
 from sand_sim import rotation
-from sand_sim.body_model import BodyModel, model_body
+from sand_sim.body_model import BodyModel, lighten, model_body
 from sand_sim.engine.arrays import DemArrays, Setting
 from sand_sim.engine.device import open_device
 from sand_sim.engine.explicit_dem import ExplicitDem
@@ -62,6 +62,7 @@ class Assembly:
 
     Attributes:
         scene: what it was made from.
+        light: the same as the time step must see it, see ``body_model.lighten``.
         fill_numbers: grains of each fill; their identities follow one another, those of the bodies come last.
         table: grains and bodies as the scene places them.
         walls: analytic surfaces.
@@ -78,6 +79,7 @@ class Assembly:
     """
 
     scene: Scene
+    light: Scene
     fill_numbers: list[int]
     table: GrainTable
     walls: list[Wall]
@@ -118,7 +120,7 @@ class Assembly:
 
     def safe_step(self, speed: float, depth: float) -> float:
         """The step [s] that would be safe at a top speed [m/s] and an overlap over radius [1]."""
-        free = replace(self.scene, solver=replace(self.scene.solver, time_step=None))
+        free = replace(self.light, solver=replace(self.light.solver, time_step=None))
         spacings = [tool.body.spacing for tool in self.tools]
         return choose_time_step(free, self.smallest, max(speed, self.time_step.speed), spacings, max(depth, DEEP)).safe
 
@@ -150,7 +152,8 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     table = GrainTable.join([*fills, *(body.table(order.index(body.body.material)) for body in bodies)])
     device = _open_device(scene, len(table))
     smallest = {order[k]: float(table.radius[table.material == k].min()) for k in np.unique(table.material)}
-    time_step, frame_steps = _time_step(scene, table, smallest, walls, tools, grounds)
+    light = lighten(scene, table, order)
+    time_step, frame_steps = _time_step(light, table, smallest, walls, tools, grounds)
     precision = PRECISIONS[scene.solver.precision]
     lattice = _lattice(scene, table, walls, tools, grounds, precision)
     recipe = Recipe(
@@ -178,7 +181,21 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     )
     numbers, solver = [fill.grains for fill in fills], ExplicitDem(arrays, device)
     return Assembly(
-        scene, numbers, table, walls, tools, bodies, grounds, smallest, time_step, frame_steps, lattice, recipe, pairs, solver
+        scene,
+        light,
+        numbers,
+        table,
+        walls,
+        tools,
+        bodies,
+        grounds,
+        smallest,
+        time_step,
+        frame_steps,
+        lattice,
+        recipe,
+        pairs,
+        solver,
     )
 
 

@@ -1,6 +1,6 @@
 """A scene's free rigid bodies made into spheres, masses and meshes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -103,3 +103,28 @@ def model_body(body: Body, scene: Scene, progress) -> BodyModel:
 def _listed(rows: tuple) -> Shape:
     spheres = np.asarray(rows, float)
     return shape_of_spheres(spheres[:, :3], spheres[:, 3])
+
+
+def lighten(scene: Scene, table: GrainTable, order: list[str]) -> Scene:
+    """The scene as the time step must see it: no sphere heavier than what yields at its contacts.
+
+    A push at an arm a from the centre of a body of mass m and inertia I moves ``1 / (1/m + a^2/I)``, which for hollow, slender or
+    given masses can be less than the mass of a solid sphere of that radius; the density of the material is lowered by as much.
+
+    Args:
+        scene: as read.
+        table: grains and bodies.
+        order: names of the materials by their index in the table.
+    """
+    materials = list(scene.materials)
+    part = ~table.lone
+    body, bodies = table.body[part], table.bodies
+    arm = np.linalg.norm(table.offset[part], axis=1)
+    yields = 1.0 / (1.0 / bodies.mass[body] + arm**2 / bodies.inertia.min(axis=1, initial=np.inf)[body])
+    for index in np.unique(table.material[part]):
+        k = scene.material_index(order[index])
+        chosen = table.material[part] == index
+        solid = materials[k].density * 4.0 / 3.0 * np.pi * table.radius[part][chosen] ** 3
+        share = min(1.0, float((yields[chosen] / solid).min()))
+        materials[k] = replace(materials[k], density=share * materials[k].density)
+    return replace(scene, materials=tuple(materials))

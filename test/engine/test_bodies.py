@@ -236,3 +236,16 @@ def test_body_that_leaves_is_retired_whole(make_bodies):
     assert len(observation.spheres) == 2
     assert [body.name for body in observation.bodies] == ["kept"]
     assert observation.health.retired == 1
+
+
+def test_light_body_gets_a_small_enough_step(make_bodies):
+    """A ball far lighter than its material hits a floor elastically at the automatic step: it leaves as fast as it came."""
+    steps = []
+    for mass in (1.3e-3, 1e-6):
+        ball = {"spheres": [[0.0, 0.0, 0.0, 0.005]], "mass": mass, "velocity": [0.0, 0.0, -0.5]}
+        ball |= {"inertia": [0.4 * mass * 0.005**2] * 3, "pose": {"position": [0.0, 0.0, 0.0051]}}
+        world = make_bodies({"ball": ball}, restitution=1.0, friction=0.0, boundaries=floor())
+        world.step(round(0.004 / world.time_step))
+        assert world.observe().body("ball").velocity[2] == pytest.approx(0.5, rel=5e-3)
+        steps.append(world.time_step)
+    assert steps[1] / steps[0] == pytest.approx((1e-6 / 1.3e-3) ** 0.4, rel=0.05)  # as the contact time
