@@ -97,7 +97,7 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
         np.bincount(part, Surface.areas_of(vertices[f]), minlength=len(loops)) for part, f in ((component, faces), (owner, caps))
     )
     sheet = {"auto": cap_area > _SHEET * area, "never": np.zeros(len(area), bool), "always": loops > 0}[sheets]
-    enclosing = sheets == "auto" and sheet.any() and _enclosing(vertices[faces], sheet[component])
+    enclosing = sheets == "auto" and sheet.sum() > 1 and _enclosing(vertices[faces], sheet[component])
     if enclosing:
         report.warnings.append(f"{sheet.sum()} open pieces enclose a solid together; its inside is found by winding number")
     elif sheets != "never":
@@ -184,8 +184,8 @@ def _enclosing(triangles: np.ndarray, open_: np.ndarray) -> bool:
     asked = np.flatnonzero(open_ & (surface.areas > 0.0))
     centre, step = surface.triangles[asked].mean(axis=1), 1e-4 * surface.unit * surface.normals[asked]
     before, behind = surface.winding(centre + step), surface.winding(centre - step)
-    sound = (before < 0.25) & (behind > 0.75)
-    inverted = (before < -0.75) & (behind > -0.25)
+    sound = (before < 0.1) & (behind > 0.9)
+    inverted = (before < -0.9) & (behind > -0.1)
     area = surface.areas[asked]
     return max(area[sound].sum(), area[inverted].sum()) > _ENCLOSED * area.sum()
 
