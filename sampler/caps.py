@@ -16,17 +16,16 @@ def close_holes(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) 
         component: of each face, shape (m,).
 
     Returns:
-        Faces of the caps, oriented as their component, shape (k, 3); component of each, shape (k,); loops closed in each
-        component, shape (components,).
+        Faces of the caps, oriented as their component, shape (k, 3); component of each, shape (k,); corners of the loop that
+        each helps to close, shape (k,).
     """
-    loops = np.zeros(int(component.max(initial=-1)) + 1, int)
-    caps, owners = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)]
+    caps, owners, lengths = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
     for owner, loop in boundary_loops(faces, component):
         cap = span_loop(vertices, loop)
         caps.append(cap)
         owners.append(np.full(len(cap), owner))
-        loops[owner] += 1
-    return np.concatenate(caps), np.concatenate(owners), loops
+        lengths.append(np.full(len(cap), len(loop)))
+    return np.concatenate(caps), np.concatenate(owners), np.concatenate(lengths)
 
 
 def boundary_loops(faces: np.ndarray, component: np.ndarray):

@@ -19,8 +19,10 @@ from sampler.welding import sew_edges
 SOLID, CAP, SHEET = 0, 1, 2
 
 _SHEET = 0.10  # a component is a sheet if closing it takes more area than this share of its own
-_SMALL_HOLE = 0.02  # share of the area above which a closed hole deserves a warning
 _ENCLOSED = 0.9  # share of the area that must have an inside for loose pieces to count as one solid
+_FEW = 8  # faces of a component in which a hole of three corners is nothing special
+_SCATTERED = 50  # open pieces from which a mesh is likely to be a cracked solid
+_CRUMB = 0.01  # share of the area below which one of many open pieces is part of a cracked surface
 _LOOSE = 0.5  # share of the area in single triangles from which a mesh is a soup
 
 
@@ -92,27 +94,31 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     if report.steps["edges sewn"]:
         faces = _drop(sewn[faces], report)
     faces, component, piece, report.steps["faces turned"], clashes = agree_faces(vertices, faces)
-    caps, owner, loops = close_holes(vertices, faces, component)
-    area, cap_area = (
-        np.bincount(part, Surface.areas_of(vertices[f]), minlength=len(loops)) for part, f in ((component, faces), (owner, caps))
-    )
-    sheet = {"auto": cap_area > _SHEET * area, "never": np.zeros(len(area), bool), "always": loops > 0}[sheets]
-    enclosing = sheets == "auto" and sheet.sum() > 1 and _enclosing(vertices[faces], sheet[component])
-    if enclosing:
-        report.warnings.append(f"{sheet.sum()} open pieces enclose a solid together; its inside is found by winding number")
-    elif sheets != "never":
+    caps, owner, corners = close_holes(vertices, faces, component)
+    area = np.bincount(component, Surface.areas_of(vertices[faces]))
+    sheet = _sheets(sheets, component, area, owner, corners, Surface.areas_of(vertices[caps]))
+    enclosing = sheets == "auto" and sheet.sum() > 1 and _enclosing(vertices[faces], sheet[component], sheet.sum() > _SCATTERED)
+    if not enclosing and sheets != "never":
         _refuse_soup(component, area, sheet)
-    kind = np.where(sheet[component] & (not enclosing), SHEET, SOLID)
     keep = ~sheet[owner]
-    report.steps["holes closed"] = int(loops[~sheet].sum())
-    report.steps["sheets"] = 0 if enclosing else int(sheet.sum())
+    loose = sheet.copy()
+    crumbs = sheet & (area < _CRUMB * area.sum())
+    if enclosing or (crumbs.sum() > _SCATTERED and sheets == "auto"):
+        sheet = sheet & ~crumbs & (not enclosing)
+        report.warnings.append(f"{crumbs.sum()} small open pieces are taken for parts of one cracked surface")
+        enclosing = True
+    kind = np.where(sheet[component], SHEET, SOLID)
+    report.steps["holes closed"] = round(float((1.0 / (corners[keep] - 2)).sum()))  # a loop of n corners takes n - 2 faces
+    report.steps["sheets"] = int(sheet.sum())
     faces = np.concatenate([faces, caps[keep]])
     component = np.concatenate([component, owner[keep]])
     kind = np.concatenate([kind, np.full(int(keep.sum()), CAP)])
-    faces, report.steps["components turned"] = face_outward(vertices, faces, component, kind == SHEET)
-    if len(np.unique(piece)) > len(area):
-        faces, kind = _mend_pieces(vertices, faces, kind, piece, report)
-    _warn(report, float(cap_area[~sheet].sum() / area.sum()), clashes)
+    faces, report.steps["components turned"] = face_outward(vertices, faces, component, loose[component])
+    if int(piece.max()) >= len(area):
+        asked = np.flatnonzero((kind == SOLID) & ~loose[component])
+        faces, kind = _mend_pieces(vertices, faces, kind, piece, asked, report)
+    large = Surface.areas_of(vertices[caps[keep & (corners > 3)]]).sum()
+    _warn(report, float(large / area.sum()), int((keep & (corners > 3)).sum()), clashes)
     return RepairedMesh(vertices, faces, kind, component, not enclosing, report)
 
 
@@ -164,9 +170,8 @@ def _interfaces(faces: np.ndarray, opposed: np.ndarray) -> np.ndarray:
     return opposed & parting[region]
 
 
-def _mend_pieces(vertices, faces, kind, piece, report) -> tuple[np.ndarray, np.ndarray]:
+def _mend_pieces(vertices, faces, kind, piece, asked, report) -> tuple[np.ndarray, np.ndarray]:
     """Turn pieces between many-sided edges that still face inward; what then has the outside on both sides is a sheet."""
-    asked = np.flatnonzero(kind[: len(piece)] == SOLID)
     for last in (False, True):
         turn, free = turn_pieces(vertices[faces[asked]], piece[asked], Surface(vertices[faces[kind != SHEET]]))
         if last or not turn.any():
@@ -178,14 +183,26 @@ def _mend_pieces(vertices, faces, kind, piece, report) -> tuple[np.ndarray, np.n
     return faces, kind
 
 
-def _enclosing(triangles: np.ndarray, open_: np.ndarray) -> bool:
+def _sheets(choice: str, component, area, owner, corners, cap_areas) -> np.ndarray:
+    """Components that are sheets. A hole of three corners in more than a few faces is a face that was lost."""
+    if choice == "never":
+        return np.zeros(len(area), bool)
+    if choice == "always":
+        return np.bincount(owner, minlength=len(area)) > 0
+    lost = (corners == 3) & (np.bincount(component)[owner] > _FEW)
+    cap_area = np.bincount(owner[~lost], cap_areas[~lost], minlength=len(area))
+    return cap_area > _SHEET * area
+
+
+def _enclosing(triangles: np.ndarray, open_: np.ndarray, lenient: bool) -> bool:
     """Whether open pieces, with everything else, have an inside behind and an outside before nearly all of their area."""
     surface = Surface(triangles)
     asked = np.flatnonzero(open_ & (surface.areas > 0.0))
     centre, step = surface.triangles[asked].mean(axis=1), 1e-4 * surface.unit * surface.normals[asked]
     before, behind = surface.winding(centre + step), surface.winding(centre - step)
-    sound = (before < 0.1) & (behind > 0.9)
-    inverted = (before < -0.9) & (behind > -0.1)
+    doubt = 0.25 if lenient else 0.1
+    sound = (before < doubt) & (behind > 1.0 - doubt)
+    inverted = (before < doubt - 1.0) & (behind > -doubt)
     area = surface.areas[asked]
     return max(area[sound].sum(), area[inverted].sum()) > _ENCLOSED * area.sum()
 
@@ -199,10 +216,11 @@ def _refuse_soup(component: np.ndarray, area: np.ndarray, sheet: np.ndarray) -> 
         )
 
 
-def _warn(report: RepairReport, hole: float, clashes: int) -> None:
-    if hole > _SMALL_HOLE:
+def _warn(report: RepairReport, hole: float, faces: int, clashes: int) -> None:
+    if faces:
         report.warnings.append(
-            f"holes of {100.0 * hole:.1f} % of the surface were closed flat; sign, volume and inertia are uncertain there"
+            f"holes were closed flat with {faces} faces, {100.0 * hole:.2g} % of the surface; "
+            "sign, volume and inertia are uncertain there"
         )
     if clashes:
         report.warnings.append(f"{clashes} edges join faces that cannot be oriented consistently (one-sided or self-touching)")
