@@ -28,7 +28,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     import warp as wp
 
-    wp.config.quiet = True
+    wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
     from sampler.cache import sample_file
     from sampler.distance import SignedDistance
     from sampler.location import locate_mesh

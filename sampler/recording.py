@@ -87,9 +87,8 @@ class Recording:
         number = [max(2, int((high - low)[k] / step)) for k in (u, v)]
         places = np.empty((*number, 3))
         places[..., axis] = 0.5 * (low + high)[axis]
-        places[..., u], places[..., v] = np.meshgrid(
-            *(np.linspace(low[k], high[k], n) for k, n in zip((u, v), number)), indexing="ij"
-        )
+        along = [np.linspace(low[k], high[k], n) for k, n in ((u, number[0]), (v, number[1]))]
+        places[..., u], places[..., v] = np.meshgrid(*along, indexing="ij")
         far = distance.query(places.reshape(-1, 3))[0]
         shade = (
             1.0

@@ -30,6 +30,9 @@ def save_body(path: str | Path, body: ParticleBody) -> None:
             try:
                 np.savez(file, **arrays)
                 file.close()
+                umask = os.umask(0)
+                os.umask(umask)
+                os.chmod(file.name, 0o666 & ~umask)  # as any other file, not for the owner only
                 os.replace(file.name, path)
             except BaseException:
                 Path(file.name).unlink(missing_ok=True)
