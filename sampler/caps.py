@@ -4,7 +4,7 @@ import numpy as np
 
 from sampler.topology import edges_of
 
-_LONGEST = 160  # corners of a loop that are spanned with least area; longer loops are first cut at their flattest corners
+_LONGEST = 80  # corners of a loop that are spanned with least area; longer loops are first cut at their flattest corners
 
 
 def close_holes(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -30,8 +30,13 @@ def check_file(path: Path) -> None:
     check.get(path.suffix.lower(), lambda name, data: None)(path.name, data)
 
 
+def is_text_stl(data: bytes) -> bool:
+    """Whether an STL file is text; binary files may begin with ``solid`` too."""
+    return data.lstrip()[:5].lower() == b"solid" and (b"facet" in data[:2000] or b"endsolid" in data[:2000])
+
+
 def _check_stl(name: str, data: bytes) -> None:
-    if data.lstrip()[:5].lower() == b"solid" and (b"facet" in data[:2000] or b"endsolid" in data[:2000]):
+    if is_text_stl(data):
         if b"endsolid" not in data[-2000:]:
             raise MeshError(f"mesh {name}: is cut off: it does not end with 'endsolid'; copy or export it again")
         if data.count(b"vertex") % 3 or data.count(b"endfacet") * 3 != data.count(b"vertex"):

@@ -34,7 +34,10 @@ def inset_particles(
         length = np.linalg.norm(away, axis=1)
         step = (radius - length) / np.maximum(length, 1e-9 * around.unit)
         place, depth = _deeper(place, depth, place + np.clip(step, -1.0, 1.0)[:, None] * away, around, radius)
+    shallow = depth < 0.98 * radius
+    useless = shallow & _beside(place, ~shallow, spacing)  # stuck at an edge, beside one that came down
     kept = _apart(place, _APART * spacing)
+    kept = kept[~useless[kept]]
     return place[kept], kept
 
 
@@ -55,6 +58,16 @@ def _mean_normals(points: np.ndarray, normals: np.ndarray, spacing: float) -> np
             same = near & (normals[k[1]] @ normals[i] > -0.5)
             mean[i] = normals[k[1]][same].sum(axis=0)
     return mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+
+
+def _beside(points: np.ndarray, those: np.ndarray, reach: float) -> np.ndarray:
+    """Whether one of those lies within reach of each point."""
+    found = np.zeros(len(points), bool)
+    for inside, around in _blocks(points, reach):
+        others = points[around[those[around]]]
+        for i in inside:
+            found[i] = np.any(np.linalg.norm(others - points[i], axis=1) < reach)
+    return found
 
 
 def _blocks(points: np.ndarray, width: float):

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from sampler.checking import check_file
+from sampler.checking import check_file, is_text_stl
 from sampler.errors import MeshError
 from sampler.strips import read_strips
 
@@ -61,6 +61,8 @@ def check_mesh(mesh: trimesh.Trimesh, name: str = "mesh") -> trimesh.Trimesh:
 
 def _load(path: Path) -> trimesh.Trimesh:
     """Everything that trimesh finds in a file, in one mesh, in metres where the file says what its unit is."""
+    if path.suffix.lower() == ".stl" and not is_text_stl(data := path.read_bytes()):
+        return _read_stl(data)
     scene = trimesh.load_scene(path, process=False)
     shapes = list(scene.geometry.values())
     if shapes and not any(isinstance(shape, trimesh.Trimesh) for shape in shapes):
@@ -72,3 +74,10 @@ def _load(path: Path) -> trimesh.Trimesh:
     if path.suffix.lower() in (".dae", ".zae") and unit:
         mesh.apply_scale(float(unit.group(1)))
     return mesh
+
+
+def _read_stl(data: bytes) -> trimesh.Trimesh:
+    """A binary STL file, also with bytes left over at its end, which trimesh does not take."""
+    row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    corners = np.frombuffer(data, row, int.from_bytes(data[80:84], "little"), 84)["corners"].astype(float)
+    return trimesh.Trimesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), process=False)

@@ -114,8 +114,8 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     component = np.concatenate([component, owner[keep]])
     kind = np.concatenate([kind, np.full(int(keep.sum()), CAP)])
     faces, report.steps["components turned"] = face_outward(vertices, faces, component, loose[component])
-    if int(piece.max()) >= len(area):
-        asked = np.flatnonzero((kind == SOLID) & ~loose[component])
+    asked = np.flatnonzero((kind == SOLID) & ~loose[component])
+    if len(asked) and int(piece.max()) >= len(area):
         faces, kind = _mend_pieces(vertices, faces, kind, piece, asked, report)
     large = Surface.areas_of(vertices[caps[keep & (corners > 3)]]).sum()
     _warn(report, float(large / area.sum()), int((keep & (corners > 3)).sum()), clashes)

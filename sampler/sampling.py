@@ -22,6 +22,7 @@ _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest 
 _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
 _WALL_SAMPLES = 4000
+_PLACES = 60  # per particle, to move buried ones to
 
 Progress = Callable[[float], None]
 
@@ -72,14 +73,16 @@ def sample_body(
     fine = _spacing(radius, spacing, count, grain, rough)
     around = Surface(closed, device)
     free, parent = free_triangles(closed, around, fine)
+    solid, cut = around, not np.array_equal(np.unique(parent, return_counts=True)[1], np.ones(len(free)))
     warnings = list(repaired.report.warnings)
     volume, centre, inertia = _mass(closed, free, parent, around, warnings)
-    if thickness <= 2.0 * radius:
+    if thickness <= 2.0 * radius and np.any(owner == SHEET):
         sheet = repaired.triangles[repaired.kind == SHEET]
-        solid = closed[owner != SHEET]
-        if len(sheet) and len(solid):
-            sheet, _ = free_triangles(sheet, Surface(solid, device), fine, two_sided=True)
+        if np.any(owner != SHEET):
+            solid = Surface(closed[owner != SHEET], device)
+            sheet, _ = free_triangles(sheet, solid, fine, two_sided=True)
         free = np.concatenate([free[owner[parent] != SHEET], sheet[Surface.areas_of(sheet) > 0.0]])
+        cut = cut and np.any(owner != SHEET)
     if not len(free):
         raise MeshError("mesh: no part of its surface has an outside; check its orientation")
     skin = Skin(free, device)
@@ -92,6 +95,8 @@ def sample_body(
                 "check the mesh's scale, or take larger particles"
             )
         points, normals = spread_particles(skin, number, seed, progress, observe)
+        if cut:
+            points, normals = _unbury(points, normals, skin, solid)
         evenness = measure_evenness(skin, points, normals)
         h = lattice_spacing(area, len(points))
         if grain is None or evenness.coverage * h < radius + grain:
@@ -120,6 +125,21 @@ def sample_body(
         steps=dict(repaired.report.steps),
         warnings=tuple(warnings),
     )
+
+
+def _unbury(points: np.ndarray, normals: np.ndarray, skin: Skin, solid: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Move particles at the border of a cut surface that are still a little inside another part to the nearest free place."""
+    step = 2e-5 * solid.unit
+    buried = np.flatnonzero(np.abs(solid.winding(points + step * normals)) > 0.5)
+    if not len(buried):
+        return points, normals
+    places, up = skin.sample(_PLACES * len(points), np.random.default_rng(2))
+    open_ = np.abs(solid.winding(places + step * up)) < 0.5
+    places, up = places[open_], up[open_]
+    for i in buried:
+        k = int(np.argmin(np.linalg.norm(places - points[i], axis=1)))
+        points[i], normals[i] = places[k], up[k]
+    return points, normals
 
 
 def thinnest_wall(surface: Surface) -> float:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sampler.caps import close_holes
 from sampler.repair import SHEET, RepairedMesh
 from sampler.surface import Surface
 from sampler.topology import edges_of, link_items
@@ -61,7 +62,9 @@ def thicken(vertices: np.ndarray, faces: np.ndarray, thickness: float) -> tuple[
         np.stack([front[face, head], front[face, tail], back[face, tail]], axis=1),
         np.stack([front[face, head], back[face, tail], back[face, head]], axis=1),
     ]
-    return place + 0.5 * thickness * offset, np.concatenate([front, back[:, ::-1], *strip])
+    faces = np.concatenate([front, back[:, ::-1], *strip])
+    ends, _, _ = close_holes(place, faces, np.zeros(len(faces), np.int64))  # where several rims meet
+    return place + 0.5 * thickness * offset, np.concatenate([faces, ends])
 
 
 def _continued_sides(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 
 import numpy as np
 import warp as wp
@@ -201,8 +202,12 @@ def launch_shares(kernel, number: int, inputs: list, outputs: list, device: str)
     if cores == 1:
         run(0, number)
         return
-    with ThreadPoolExecutor(cores) as pool:
-        list(pool.map(run, cuts[:-1], cuts[1:]))
+    list(_pool(cores).map(run, cuts[:-1], cuts[1:]))
+
+
+@cache
+def _pool(cores: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(cores, thread_name_prefix="sampler")
 
 
 def closest_on_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
