@@ -73,6 +73,14 @@ class ParticleBody:
         """Radius of the smallest grain that cannot pass between the particles, however it is pushed sideways [m]."""
         return max(0.0, self.coverage - self.radius)
 
+    def roughness(self, grain: float) -> float:
+        """Largest angle [rad] between the normal of a contact with a grain of this radius [m] and that of the surface.
+
+        On a flat face a grain that touches a particle from a place at distance ``R_c`` from it leans by
+        ``asin(R_c / (r + grain))``; ``R_c`` is at most the coverage.
+        """
+        return float(np.arcsin(min(1.0, self.coverage / (self.radius + grain))))
+
     def mass_properties(self, density: float | None = None, mass: float | None = None) -> MassProperties:
         """Mass, centre and principal inertia.
 

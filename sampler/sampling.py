@@ -77,12 +77,14 @@ def sample_body(
     warnings = list(repaired.report.warnings)
     volume, centre, inertia = _mass(closed, free, parent, around, warnings)
     if thickness <= 2.0 * radius and np.any(owner == SHEET):
-        sheet = repaired.triangles[repaired.kind == SHEET]
-        if np.any(owner != SHEET):
+        # One layer in the sheets; the skin of the solids ends only where it is buried in other solids.
+        free = repaired.triangles[repaired.kind == SHEET]
+        cut = np.any(owner != SHEET)
+        if cut:
             solid = Surface(closed[owner != SHEET], device)
-            sheet, _ = free_triangles(sheet, solid, fine, two_sided=True)
-        free = np.concatenate([free[owner[parent] != SHEET], sheet[Surface.areas_of(sheet) > 0.0]])
-        cut = cut and np.any(owner != SHEET)
+            sheet, _ = free_triangles(free, solid, fine, two_sided=True)
+            free = np.concatenate([free_triangles(solid.triangles, solid, fine)[0], sheet])
+        free = free[Surface.areas_of(free) > 0.0]
     if not len(free):
         raise MeshError("mesh: no part of its surface has an outside; check its orientation")
     skin = Skin(free, device)

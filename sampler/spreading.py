@@ -16,8 +16,8 @@ _TURNS, _REFILL_TURNS = 120, 30
 _REFILLS = 12
 _SAMPLED = 40  # places per particle at which gaps are looked for
 _STRENGTH = 0.25  # of a push, in spacings
-_GAP, _SKIN_GAP = 0.75, 0.92  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
-_LEAST = 0.42  # particles nearer than this to one another are a fault, in spacings
+_GAP, _SKIN_GAP = 0.78, 0.95  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
+_LEAST = 0.50  # particles nearer than this to one another are a fault, in spacings
 _AROUND = 4.0  # distance from a filled gap or a removed particle within which others move, in spacings
 _MEASURED = 100  # places per particle at which the result is measured
 _SPARE = 0.005  # share of the particles kept back for gaps, and share that may be added above the wanted number
@@ -132,6 +132,7 @@ class _State:
 
     def gaps(self, places: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, float]:
         """Places in gaps, the deepest first and none near a deeper one; and the sum of all faults."""
+        self.normals = self._vectors(self.result()[1])  # on an edge either face may be the nearest; judge by the final choice
         free, own, nearest = self.distances(places, normals)
         excess = np.maximum(free - _GAP, own - _SKIN_GAP)
         found = np.flatnonzero(excess > 0.0)

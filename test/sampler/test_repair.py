@@ -17,7 +17,7 @@ def signs(mesh, sound, seed=1):
     near, _ = trimesh.sample.sample_surface(sound, 3000, seed=seed)
     near = near + random.normal(size=near.shape) * 5e-3 * np.linalg.norm(sound.extents)
     distance, wrong = SignedDistance(mesh), []
-    for places in (grid_around(sound, 20), near):
+    for places in (grid_around(sound, 16), near):
         points = places[far_from_surface(SignedDistance(sound), places)]
         inside = distance.query(points)[0] < 0.0
         wrong.append(np.mean(inside != solid_angle_inside(np.asarray(sound.triangles), points)))
