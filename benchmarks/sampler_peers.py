@@ -16,6 +16,7 @@ import numpy as np
 import trimesh
 
 from sampler import MeshError, read_mesh, repair_mesh, sample_body
+from sampler.repair import SHEET
 from sampler.skin import Skin, free_triangles
 from sampler.spreading import lattice_spacing, measure_evenness
 from sampler.surface import Surface
@@ -76,10 +77,14 @@ METHODS = {
 
 def judge(mesh, method, count):
     """One row: count, evenness and coverage against the free surface after repair, whatever the method sampled."""
-    repaired = repair_mesh(mesh)
-    triangles = repaired.triangles
-    free, _ = free_triangles(triangles, Surface(triangles), lattice_spacing(mesh.area, count))
-    skin = Skin(free if len(free) else triangles)
+    repaired, h = repair_mesh(mesh), lattice_spacing(mesh.area, count)
+    sheet, solid = (repaired.triangles[(repaired.kind == SHEET) == flat] for flat in (True, False))
+    if len(solid):
+        around = Surface(solid)
+        sheet = free_triangles(sheet, around, h, two_sided=True)[0] if len(sheet) else sheet
+        solid = free_triangles(solid, around, h)[0]
+    free = np.concatenate([solid, sheet])
+    skin = Skin(free[Surface.areas_of(free) > 0.0])
     begin = time.process_time()
     points = np.asarray(method(mesh, count), float)
     seconds = time.process_time() - begin
