@@ -1,9 +1,27 @@
 """From a triangle mesh to a rigid body of evenly spaced surface particles. Knows neither ROS nor sand_sim."""
 
-from sampler.body import ParticleBody, sample_body
+from sampler.body import ParticleBody
+from sampler.cache import sample_file
 from sampler.distance import SignedDistance
 from sampler.errors import MeshError
+from sampler.field import DistanceField, make_field
 from sampler.location import locate_mesh
 from sampler.reading import read_mesh
+from sampler.repair import repair_mesh
+from sampler.sampling import sample_body
+from sampler.storage import load_body, save_body
 
-__all__ = ["MeshError", "ParticleBody", "SignedDistance", "locate_mesh", "read_mesh", "sample_body"]
+__all__ = [
+    "DistanceField",
+    "MeshError",
+    "ParticleBody",
+    "SignedDistance",
+    "load_body",
+    "locate_mesh",
+    "make_field",
+    "read_mesh",
+    "repair_mesh",
+    "sample_body",
+    "sample_file",
+    "save_body",
+]

@@ -1,16 +1,29 @@
 """The rigid particle body made from a mesh."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-import trimesh
 
-from sampler.distance import SignedDistance
 from sampler.errors import MeshError
-from sampler.spreading import spread_particles
+from sampler.mass import MassProperties, principal_axes
 
-SPACING = 1.5  # default distance between neighbours in particle radii; below 2 so that particles overlap into a closed skin
+
+@dataclass(frozen=True)
+class Evenness:
+    """How the particles lie, in spacings ``h = sqrt(2 A / (sqrt(3) N))``.
+
+    Attributes:
+        variation: of the distance to the nearest neighbour, standard deviation over mean.
+        nearest, farthest: smallest and largest distance to the nearest neighbour.
+        coverage: largest distance of a place of the surface from the nearest particle.
+        skin_coverage: the same, measured along the surface, so that the other skin of a thin wall does not count.
+    """
+
+    variation: float
+    nearest: float
+    farthest: float
+    coverage: float
+    skin_coverage: float
 
 
 @dataclass(frozen=True)
@@ -18,68 +31,72 @@ class ParticleBody:
     """A rigid list of spheres with the mass properties of the solid it was sampled from; mesh frame throughout.
 
     Attributes:
-        points: particle centres, on the surface, shape (n, 3) [m].
+        points: particle centres, shape (n, 3) [m].
         normals: outward normals of the faces they lie on, shape (n, 3).
         radius: of every particle [m].
-        spacing: asked distance between neighbours [m].
-        volume: of the solid [m^3]; NaN where the mesh is not closed.
+        spacing: of the triangular lattice with as many particles on the same area [m].
+        area: that particles cover [m^2].
+        volume: of the solid [m^3]; NaN where it cannot be told.
         centre: centre of mass at uniform density, shape (3,) [m].
         inertia: about the centre per unit density, shape (3, 3) [m^5].
+        triangles: closed surface of the solid after repair, outward, shape (m, 3, 3) [m].
+        thinnest_wall: [m]; infinite where no two skins face away from one another.
+        evenness: of the particles.
+        steps: what was mended and how often.
+        warnings: what the user should know.
     """
 
     points: np.ndarray
     normals: np.ndarray
     radius: float
     spacing: float
+    area: float
     volume: float
     centre: np.ndarray
     inertia: np.ndarray
+    triangles: np.ndarray
+    thinnest_wall: float
+    evenness: Evenness
+    steps: dict[str, int] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.points)
 
+    @property
+    def coverage(self) -> float:
+        """Largest distance of a place of the surface from the nearest particle [m]."""
+        return self.evenness.coverage * self.spacing
 
-def sample_body(
-    mesh: trimesh.Trimesh,
-    radius: float,
-    spacing: float | None = None,
-    seed: int = 0,
-    device: str = "cpu",
-    progress: Callable[[float], None] = lambda share: None,
-) -> ParticleBody:
-    """Sample a mesh into a particle body.
+    @property
+    def smallest_grain(self) -> float:
+        """Radius of the smallest grain that cannot pass between the particles, however it is pushed sideways [m]."""
+        return max(0.0, self.coverage - self.radius)
 
-    Args:
-        mesh: in metres.
-        radius: of every particle [m].
-        spacing: wanted distance between neighbours [m]; 1.5 radii if None.
-        seed: of the random start.
-        device: Warp device.
-        progress: called with the share of the work done, 0 to 1.
+    def roughness(self, grain: float) -> float:
+        """Largest angle [rad] between the normal of a contact with a grain of this radius [m] and that of the surface.
 
-    Raises:
-        MeshError: if radius or spacing are not positive, or the particles would be too many to be meant.
-    """
-    spacing = SPACING * radius if spacing is None else spacing
-    for name, value in (("radius", radius), ("spacing", spacing)):
-        if not np.isfinite(value) or value <= 0.0:
-            raise MeshError(f"particle {name} must be positive [m], got {value}")
-    if mesh.area / spacing**2 > 2e6:
-        raise MeshError(
-            f"a surface of {mesh.area:.3g} m^2 would need {mesh.area / spacing**2:.2g} particles of radius {radius:.3g} m; "
-            "check the mesh's scale, or take larger particles"
-        )
-    field = SignedDistance(mesh, device)
-    points = spread_particles(mesh, field, spacing, seed, progress)
-    _, _, normals = field.query(points)
-    closed = bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0.0)
-    solid = mesh.mass_properties if closed else None
-    return ParticleBody(
-        points=points,
-        normals=normals.astype(float),
-        radius=radius,
-        spacing=spacing,
-        volume=float(solid.volume) if closed else float("nan"),
-        centre=np.asarray(solid.center_mass if closed else mesh.centroid, float),
-        inertia=np.asarray(solid.inertia, float) if closed else np.full((3, 3), np.nan),
-    )
+        On a flat face a grain that touches a particle from a place at distance ``R_c`` from it leans by
+        ``asin(R_c / (r + grain))``; ``R_c`` is at most the coverage.
+        """
+        return float(np.arcsin(min(1.0, self.coverage / (self.radius + grain))))
+
+    def mass_properties(self, density: float | None = None, mass: float | None = None) -> MassProperties:
+        """Mass, centre and principal inertia.
+
+        Args:
+            density: [kg/m^3], or
+            mass: [kg], of which exactly one is given.
+
+        Raises:
+            MeshError: if the volume is unknown, or not exactly one positive number is given.
+        """
+        given = [value for value in (density, mass) if value is not None]
+        if len(given) != 1 or not np.isfinite(given[0]) or given[0] <= 0.0:
+            raise MeshError("give either a density [kg/m^3] or a mass [kg], positive")
+        if not np.isfinite(self.volume):
+            raise MeshError("the mesh has no sound volume, so mass and inertia cannot be told; give them by hand")
+        density = mass / self.volume if density is None else density
+        inertia = density * self.inertia
+        moments, axes = principal_axes(inertia)
+        return MassProperties(density * self.volume, self.centre, inertia, moments, axes)

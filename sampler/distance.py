@@ -2,44 +2,37 @@
 
 import numpy as np
 import trimesh
-import warp as wp
 
+from sampler.pseudonormals import Pseudonormals
+from sampler.repair import RepairedMesh, repair_mesh
+from sampler.sheets import closed_triangles
+from sampler.surface import Surface
 
-@wp.kernel(enable_backward=False, module="unique")
-def query_surface(
-    mesh: wp.uint64,
-    points: wp.array(dtype=wp.vec3),
-    limit: float,
-    distance: wp.array(dtype=float),
-    closest: wp.array(dtype=wp.vec3),
-    normal: wp.array(dtype=wp.vec3),
-):
-    """Closest point of the mesh, its face normal, and the signed distance of each point; negative inside."""
-    i = wp.tid()
-    found = wp.mesh_query_point_sign_winding_number(mesh, points[i], limit)
-    if found.result:
-        nearest = wp.mesh_eval_position(mesh, found.face, found.u, found.v)
-        closest[i] = nearest
-        normal[i] = wp.mesh_eval_face_normal(mesh, found.face)
-        distance[i] = found.sign * wp.length(points[i] - nearest)
+_NEAR = 1e-5  # of the diagonal; where single precision may blur the winding number the nearest face decides
 
 
 class SignedDistance:
     """Distance queries against a mesh, on the CPU or a GPU.
 
     Args:
-        mesh: in metres.
+        mesh: in metres; repaired here unless it already is.
         device: Warp device.
+        thickness: of sheets (surfaces modelled without thickness) [m]; at 0 they have a distance but no inside.
+
+    Attributes:
+        surface: the closed triangles.
+        repaired: what they were made from.
+
+    Raises:
+        MeshError: if the mesh cannot be repaired.
     """
 
-    def __init__(self, mesh: trimesh.Trimesh, device: str = "cpu"):
-        self.device = device
-        self.span = float(np.linalg.norm(mesh.extents))
-        self.mesh = wp.Mesh(
-            points=wp.array(np.asarray(mesh.vertices, np.float32), dtype=wp.vec3, device=device),
-            indices=wp.array(np.asarray(mesh.faces, np.int32).ravel(), dtype=int, device=device),
-            support_winding_number=True,
-        )
+    def __init__(self, mesh: trimesh.Trimesh | RepairedMesh, device: str = "cpu", thickness: float = 0.0):
+        self.repaired = mesh if isinstance(mesh, RepairedMesh) else repair_mesh(mesh)
+        self.device, self.thickness = device, thickness
+        triangles, _ = closed_triangles(self.repaired, thickness)
+        self.surface = Surface(triangles, device)
+        self._pseudonormals = Pseudonormals(triangles)
 
     def query(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Query points.
@@ -51,15 +44,19 @@ class SignedDistance:
             Signed distance, shape (n,) [m], negative inside; closest surface points, shape (n, 3) [m]; normals of the faces
             they lie on, shape (n, 3).
         """
-        where = wp.array(np.asarray(points, np.float32), dtype=wp.vec3, device=self.device)
-        number = len(points)
-        distance = wp.zeros(number, dtype=float, device=self.device)
-        closest, normal = (wp.zeros(number, dtype=wp.vec3, device=self.device) for _ in range(2))
-        farthest = 4.0 * self.span + float(np.abs(points).max(initial=0.0))
-        wp.launch(
-            query_surface,
-            dim=number,
-            inputs=[self.mesh.id, where, farthest, distance, closest, normal],
-            device=self.device,
-        )
-        return distance.numpy(), closest.numpy(), normal.numpy()
+        points = np.asarray(points, float).reshape(-1, 3)
+        closest, face = self.surface.closest(points)
+        distance = np.linalg.norm(points - closest, axis=1)
+        inside = np.abs(self.surface.winding(points)) > 0.5
+        near = np.flatnonzero((distance < _NEAR * self.surface.unit) & (distance > 0.0))
+        if len(near):
+            inside[near] = self._inside_near(points[near], closest[near], face[near], inside[near])
+        return np.where(inside, -distance, distance), closest, self.surface.normals[face]
+
+    def _inside_near(self, points, closest, face, inside):
+        """Sign by pseudonormal (Baerentzen & Aanaes 2005) where the winding number is whole on both sides of the surface."""
+        normal = self._pseudonormals.at(closest, face)
+        step = 2.0 * _NEAR * self.surface.unit * normal
+        before, behind = self.surface.winding(closest + step), self.surface.winding(closest - step)
+        usable = (before < 0.1) & (behind > 0.9)
+        return np.where(usable, np.einsum("ij,ij->i", points - closest, normal) < 0.0, inside)

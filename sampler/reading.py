@@ -1,45 +1,83 @@
 """Reading a mesh file and refusing what cannot become a body."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
+from sampler.checking import check_file, is_text_stl
 from sampler.errors import MeshError
-
-_POINTER = b"version https://git-lfs"
+from sampler.strips import read_strips
 
 
 def read_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
-    """Read a triangle mesh, in metres.
+    """Read a triangle mesh, in metres, as it stands in the file: nothing is merged or mended yet.
+
+    Unit and node transforms of DAE and glTF files are applied; the up axis of a DAE file is not, as in RViz.
 
     Args:
-        path: STL, OBJ, PLY, DAE or whatever else trimesh reads.
-        scale: metres per unit of the file.
+        path: STL, OBJ, PLY (also of triangle strips), DAE or whatever else trimesh reads.
+        scale: metres per unit of the file; per metre where the file states its unit.
 
     Raises:
-        MeshError: if the file is unreadable, empty, has no triangles, no extent, or vertices that are not finite.
+        MeshError: if the file is unreadable, cut off, corrupt, empty, has no triangles, no extent, or vertices that are not
+            finite.
     """
     path = Path(path)
-    try:
-        with path.open("rb") as file:
-            start = file.read(len(_POINTER))
-    except OSError as error:
-        raise MeshError(f"mesh {path.name}: cannot be read: {error.strerror}") from None
-    if start == _POINTER:
-        raise MeshError(f"mesh {path.name}: is a Git LFS pointer, not a mesh; run 'git lfs pull' where it comes from")
     if not np.isfinite(scale) or scale <= 0.0:
         raise MeshError(f"mesh {path.name}: scale must be positive, got {scale}")
+    check_file(path)
     try:
-        mesh = trimesh.load_mesh(path, process=True)
+        mesh = read_strips(path) if path.suffix.lower() == ".ply" else None
+        mesh = _load(path) if mesh is None else mesh
+    except MeshError:
+        raise
+    except ModuleNotFoundError as error:
+        raise MeshError(f"mesh {path.name}: is damaged, or a kind of {path.suffix} that needs the module {error.name}") from None
     except Exception as error:  # trimesh raises whatever its many parsers raise
         raise MeshError(f"mesh {path.name}: cannot be read as {path.suffix or 'a mesh'}: {error}") from None
-    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        raise MeshError(f"mesh {path.name}: has no triangles")
-    vertices = np.asarray(mesh.vertices, float)
-    if not np.all(np.isfinite(vertices)):
-        raise MeshError(f"mesh {path.name}: has vertices that are not finite; export it again")
     mesh.apply_scale(scale)
-    if mesh.area <= 0.0:
-        raise MeshError(f"mesh {path.name}: its triangles have no area")
+    return check_mesh(mesh, path.name)
+
+
+def check_mesh(mesh: trimesh.Trimesh, name: str = "mesh") -> trimesh.Trimesh:
+    """Refuse triangles that cannot be worked with.
+
+    Raises:
+        MeshError: if there are none, they refer to missing vertices, are not finite or have no area.
+    """
+    vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces)
+    if not len(faces):
+        raise MeshError(f"mesh {name}: has no triangles")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise MeshError(f"mesh {name}: a face refers to vertex {faces.max()} of {len(vertices)}; the file is corrupt")
+    if not np.all(np.isfinite(vertices[faces])):
+        raise MeshError(f"mesh {name}: has vertices that are not finite; export it again")
+    if mesh.area <= 1e-14 * float(np.ptp(vertices[faces].reshape(-1, 3), axis=0).max()) ** 2:
+        raise MeshError(f"mesh {name}: its triangles have no area")
     return mesh
+
+
+def _load(path: Path) -> trimesh.Trimesh:
+    """Everything that trimesh finds in a file, in one mesh, in metres where the file says what its unit is."""
+    if path.suffix.lower() == ".stl" and not is_text_stl(data := path.read_bytes()):
+        return _read_stl(data)
+    scene = trimesh.load_scene(path, process=False)
+    shapes = list(scene.geometry.values())
+    if shapes and not any(isinstance(shape, trimesh.Trimesh) for shape in shapes):
+        raise MeshError(f"mesh {path.name}: holds points or lines only, no triangles")
+    mesh = scene.to_mesh() if shapes else None
+    if mesh is None or not len(mesh.faces):
+        raise MeshError(f"mesh {path.name}: has no triangles")
+    unit = re.match(r"([-+.\deE]+) \* meters", str(shapes[0].metadata.get("units", "")))
+    if path.suffix.lower() in (".dae", ".zae") and unit:
+        mesh.apply_scale(float(unit.group(1)))
+    return mesh
+
+
+def _read_stl(data: bytes) -> trimesh.Trimesh:
+    """A binary STL file, also with bytes left over at its end, which trimesh does not take."""
+    row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    corners = np.frombuffer(data, row, int.from_bytes(data[80:84], "little"), 84)["corners"].astype(float)
+    return trimesh.Trimesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), process=False)

@@ -1,90 +1,206 @@
-"""Spread particles evenly over a mesh: scatter too many, thin them out, then let them push each other along the surface."""
+"""Spread particles evenly over a surface: throw them apart, let them push each other along it, then find gaps and fill them."""
 
 from collections.abc import Callable
 
 import numpy as np
-import trimesh
 import warp as wp
 
-from sampler.distance import SignedDistance
+from sampler.body import Evenness
+from sampler.skin import Skin
+from sampler.spreading_kernels import find_gaps, find_nearest, push_apart, throw_darts
+from sampler.surface import launch_shares
 
-_SCATTERED = 6  # random points per wanted particle
-_ROUNDS = 60
-_REACH = 2.0  # of the repulsion, in spacings
+_SCATTERED = 12  # random places per wanted particle
+_HALVINGS = 7  # of the range in which the distance of the first placing is sought
+_TURNS, _REFILL_TURNS = 120, 30
+_REFILLS = 12
+_SAMPLED = 40  # places per particle at which gaps are looked for
+_STRENGTH = 0.25  # of a push, in spacings
+_GAP, _SKIN_GAP = 0.78, 0.95  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
+_LEAST = 0.50  # particles nearer than this to one another are a fault, in spacings
+_AROUND = 4.0  # distance from a filled gap or a removed particle within which others move, in spacings
+_MEASURED = 100  # places per particle at which the result is measured
+_SPARE = 0.005  # share of the particles kept back for gaps, and share that may be added above the wanted number
+_PATIENCE = 4  # refills without improvement after which the best is taken
 
-
-@wp.kernel(enable_backward=False, module="unique")
-def push_apart(grid: wp.uint64, points: wp.array(dtype=wp.vec3), reach: float, pushed: wp.array(dtype=wp.vec3), strength: float):
-    """Move each point by ``sum_j phi(d) (p - p_j)/d`` with a Gaussian phi that has faded at ``reach`` (source document A)."""
-    i = wp.tid()
-    here = points[i]
-    push = wp.vec3(0.0)
-    for j in wp.hash_grid_query(grid, here, reach):
-        if j != i:
-            away = here - points[j]
-            distance = wp.length(away)
-            if distance < reach and distance > 0.0:
-                share = distance / reach
-                push += away / distance * (wp.exp(-8.0 * share * share) - wp.exp(-8.0))
-    pushed[i] = here + push * strength
+Observer = Callable[[np.ndarray], None]
 
 
 def particle_count(area: float, spacing: float) -> int:
     """Particles that cover an area [m^2] as a triangular lattice of the given spacing [m]: ``A / (sqrt(3)/2 h^2)``."""
-    return max(1, round(area / (np.sqrt(3.0) / 2.0 * spacing**2)))
+    return max(1, round(2.0 * area / (np.sqrt(3.0) * spacing**2)))
+
+
+def lattice_spacing(area: float, number: int) -> float:
+    """Spacing [m] of a triangular lattice of so many particles on an area [m^2]: ``h = sqrt(2 A / (sqrt(3) N))``."""
+    return float(np.sqrt(2.0 * area / (np.sqrt(3.0) * number)))
 
 
 def spread_particles(
-    mesh: trimesh.Trimesh,
-    field: SignedDistance,
-    spacing: float,
+    skin: Skin,
+    number: int,
     seed: int = 0,
     progress: Callable[[float], None] = lambda share: None,
-) -> np.ndarray:
-    """Spread particles over the surface of a mesh.
+    observe: Observer | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Spread particles over a surface.
 
     Args:
-        mesh: in metres.
-        field: distance to the same mesh.
-        spacing: wanted distance between neighbours [m].
+        skin: where they lie.
+        number: of particles.
         seed: of the random start.
         progress: called with the share of the work done, 0 to 1.
+        observe: called with the particles, shape (n, 3) [m], as they relax.
 
     Returns:
-        Particle centres on the surface, shape (n, 3) [m].
+        Particle centres on the surface, shape (number, 3) [m], and the normals of the triangles they lie on, shape (number, 3).
     """
-    number = particle_count(mesh.area, spacing)
     random = np.random.default_rng(seed)
-    scattered, _ = trimesh.sample.sample_surface(mesh, _SCATTERED * number, seed=int(random.integers(1 << 31)))
-    points = _thin_out(np.asarray(scattered), number, spacing)
-    return _relax(points, field, spacing, progress)
+    state = _State(skin, number, observe)
+    start = number - int(_SPARE * number)
+    state.place(*_throw(skin, start, state.spacing, random), np.zeros(start, bool))
+    total = _TURNS + _REFILLS * _REFILL_TURNS
+    for turn in range(_TURNS):
+        state.push(_STRENGTH * (1.0 - 0.8 * turn / _TURNS))
+        progress((turn + 1) / total)
+    state.crowding = state.crowd.numpy()
+    state.pinned = np.zeros(start, bool)
+    samples = skin.sample(_SAMPLED * number, random)
+    best, least, stuck = None, np.inf, 0
+    for turn in range(_REFILLS + 1):
+        gaps, fault = state.gaps(*samples)
+        stuck = 0 if fault < least else stuck + 1
+        if fault < least:
+            best, least = state.result(), fault
+        if not len(gaps) or turn == _REFILLS or stuck == _PATIENCE:
+            break
+        state.refill(samples[0][gaps], samples[1][gaps], pin=turn > 0)
+        for k in range(_REFILL_TURNS):
+            state.push(_STRENGTH * (0.6 - 0.5 * k / _REFILL_TURNS))
+            progress((_TURNS + turn * _REFILL_TURNS + k) / total)
+    progress(1.0)
+    return best
 
 
-def _thin_out(points: np.ndarray, number: int, spacing: float) -> np.ndarray:
-    """Keep points at least 0.7 spacings apart, first come first kept, up to the wanted number."""
-    cell = 0.7 * spacing
-    taken: dict[tuple, list[np.ndarray]] = {}
-    kept = []
-    for point in points:
-        x, y, z = (int(c) for c in np.floor(point / cell))
-        near = (taken.get((x + i, y + j, z + k), ()) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1))
-        if all(np.sum((point - other) ** 2) >= cell**2 for group in near for other in group):
-            taken.setdefault((x, y, z), []).append(point)
-            kept.append(point)
-            if len(kept) == number:
+def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Evenness:
+    """Measure particles, shape (n, 3) [m], with their normals, on the surface they lie on."""
+    state = _State(skin, len(points), None)
+    state.place(points, normals, np.zeros(len(points), bool))
+    free, own, nearest = state.distances(*skin.sample(_MEASURED * len(points), np.random.default_rng(1)))
+    variation = nearest.std() / nearest.mean()
+    return Evenness(*map(float, (variation, nearest.min(), nearest.max(), free.max(), own.max())))
+
+
+class _State:
+    """Particles on the device."""
+
+    def __init__(self, skin: Skin, number: int, observe: Observer | None):
+        self.skin, self.device, self.observe = skin, skin.device, observe
+        self.spacing = lattice_spacing(float(skin.areas.sum()), number)
+        self.unit_spacing = self.spacing / skin.unit
+        self.grid = wp.HashGrid(128, 128, 128, device=self.device)
+        self.corners = skin.shift(skin.triangles.reshape(-1, 3))
+        self.face_normals = self._vectors(skin.normals)
+        self.most = number + int(_SPARE * number)
+
+    def _vectors(self, values: np.ndarray) -> wp.array:
+        return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
+
+    def place(self, points: np.ndarray, normals: np.ndarray, held: np.ndarray) -> None:
+        self.points, self.normals = self.skin.shift(points), self._vectors(normals)
+        self.held = wp.array(held.astype(np.int32), dtype=int, device=self.device)
+        self.moved, self.moved_normals = wp.empty_like(self.points), wp.empty_like(self.normals)
+        self.crowd = wp.zeros(len(points), dtype=float, device=self.device)
+
+    def push(self, strength: float) -> None:
+        h = self.unit_spacing
+        self.grid.build(self.points, 2.0 * h)
+        inputs = [self.grid.id, self.skin.mesh.id, self.points, self.normals, self.corners, self.face_normals, self.held]
+        outputs = [self.moved, self.moved_normals, self.crowd]
+        launch_shares(push_apart, len(self.points), [*inputs, h, strength * h], outputs, self.device)
+        self.points, self.moved = self.moved, self.points
+        self.normals, self.moved_normals = self.moved_normals, self.normals
+        if self.observe:
+            self.observe(self.positions())
+
+    def positions(self) -> np.ndarray:
+        return self.points.numpy() * self.skin.unit + self.skin.centre
+
+    def result(self) -> tuple[np.ndarray, np.ndarray]:
+        points, face = self.skin.closest(self.positions())
+        return points, self.skin.normals[face]
+
+    def gaps(self, places: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, float]:
+        """Places in gaps, the deepest first and none near a deeper one; and the sum of all faults."""
+        self.normals = self._vectors(self.result()[1])  # on an edge either face may be the nearest; judge by the final choice
+        free, own, nearest = self.distances(places, normals)
+        excess = np.maximum(free - _GAP, own - _SKIN_GAP)
+        found = np.flatnonzero(excess > 0.0)
+        found = found[np.argsort(-excess[found], kind="stable")]
+        chosen: list[int] = []
+        for k in found:
+            near = np.linalg.norm(places[chosen] - places[k], axis=1) < 1.2 * self.spacing
+            if not near.any() and len(chosen) < max(4, len(self.points) // 20):
+                chosen.append(int(k))
+        open_ = np.maximum(free[chosen] - _GAP, 0.0).sum()
+        fault = float(4.0 * open_ + excess[chosen].sum() + np.maximum(_LEAST - nearest, 0.0).sum())
+        return np.array(chosen, int), fault
+
+    def distances(self, places: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Distance of places from the nearest particle and the nearest on their own skin, at most 2; of particles from others.
+
+        All in spacings.
+        """
+        reach = 2.0 * self.unit_spacing
+        self.grid.build(self.points, reach)
+        free, own = (wp.empty(len(places), dtype=float, device=self.device) for _ in range(2))
+        inputs = [self.grid.id, self.points, self.normals, self.skin.shift(places), self._vectors(normals), reach]
+        launch_shares(find_gaps, len(places), inputs, [free, own], self.device)
+        nearest = wp.empty(len(self.points), dtype=float, device=self.device)
+        launch_shares(find_nearest, len(self.points), [self.grid.id, self.points, reach], [nearest], self.device)
+        return tuple(found.numpy() / self.unit_spacing for found in (free, own, nearest))
+
+    def refill(self, places: np.ndarray, normals: np.ndarray, pin: bool) -> None:
+        """Move the most crowded particles into gaps; pinned ones stay there. Only what is near moves afterwards."""
+        points, up = self.positions(), self.normals.numpy()
+        taken: list[int] = []
+        added = max(0, min(self.most - len(points), len(places)))
+        for k in np.argsort(-self.crowding, kind="stable"):
+            if len(taken) == len(places) - added:
                 break
-    return np.array(kept)
+            around = np.concatenate([places, points[taken]])
+            if not self.pinned[k] and np.linalg.norm(around - points[k], axis=1).min() > 2.0 * self.spacing:
+                taken.append(int(k))
+        places, normals = places[: len(taken) + added], normals[: len(taken) + added]
+        changed = np.concatenate([places, points[taken]])
+        keep = np.ones(len(points), bool)
+        keep[taken] = False
+        points, up = np.concatenate([points[keep], places]), np.concatenate([up[keep], normals])
+        self.crowding = np.concatenate([self.crowding[keep], np.zeros(len(places))])
+        self.pinned = np.concatenate([self.pinned[keep], np.full(len(places), pin)])
+        moving = np.zeros(len(points), bool)
+        for place in changed:
+            moving |= np.linalg.norm(points - place, axis=1) < _AROUND * self.spacing
+        self.place(points, up, self.pinned | ~moving)
 
 
-def _relax(points: np.ndarray, field: SignedDistance, spacing: float, progress) -> np.ndarray:
-    device, reach = field.device, _REACH * spacing
-    grid = wp.HashGrid(64, 64, 64, device=device)
-    pushed = wp.zeros(len(points), dtype=wp.vec3, device=device)
-    for turn in range(_ROUNDS):
-        here = wp.array(points.astype(np.float32), dtype=wp.vec3, device=device)
-        grid.build(here, reach)
-        strength = 0.25 * spacing * (1.0 - 0.8 * turn / _ROUNDS)
-        wp.launch(push_apart, dim=len(points), inputs=[grid.id, here, reach, pushed, strength], device=device)
-        _, points, _ = field.query(pushed.numpy())
-        progress((turn + 1) / _ROUNDS)
-    return points.astype(float)
+def _throw(skin: Skin, number: int, spacing: float, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """So many random places as far apart as a halving search finds, first come first kept."""
+    points, normals = skin.sample(_SCATTERED * number, random)
+    order = random.permutation(len(points))
+    points, normals = points[order], normals[order]
+    where = skin.shift(points).to("cpu")  # one after another, so on the CPU wherever the rest runs
+    up = wp.array(normals.astype(np.float32), dtype=wp.vec3, device="cpu")
+    grid = wp.HashGrid(128, 128, 128, device="cpu")
+    low, high, best = 0.2, 1.0, np.ones(len(points), bool)
+    for _ in range(_HALVINGS):
+        share = 0.5 * (low + high)
+        apart = share * spacing / skin.unit
+        grid.build(where, apart)
+        kept = wp.zeros(len(points), dtype=int, device="cpu")
+        wp.launch(throw_darts, dim=1, inputs=[grid.id, where, up, apart, len(points), kept], device="cpu")
+        enough = kept.numpy().sum() >= number
+        low, high = (share, high) if enough else (low, share)
+        best = kept.numpy() == 1 if enough else best
+    chosen = np.flatnonzero(best)[:number]
+    return points[chosen], normals[chosen]

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import trimesh
 
-from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_body
+from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_file
 from sand_sim import rotation
 from sand_sim.body_model import BodyModel, lighten, model_body
 from sand_sim.engine.arrays import DemArrays, Setting
@@ -210,8 +210,10 @@ def _open_device(scene: Scene, spheres: int):
 
 def _model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
     try:
-        mesh = read_mesh(locate_mesh(tool.mesh, scene.folder), tool.scale)
-        body = sample_body(mesh, tool.particle_radius, progress=lambda share: progress(f"sampling {tool.name}", share))
+        path = locate_mesh(tool.mesh, scene.folder)
+        mesh = read_mesh(path, tool.scale)
+        show = partial(progress, f"sampling {tool.name}")
+        body = sample_file(path, tool.particle_radius, tool.scale, grain=_smallest_grain(scene), progress=show)
     except MeshError as error:
         raise SceneError(f"tools.{tool.name}.mesh: {error}") from None
     return ToolModel(tool, mesh, body)
@@ -220,6 +222,13 @@ def _model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
 def _loose_materials(scene: Scene) -> set[str]:
     """Names of the materials of everything that moves freely."""
     return {one.material for one in (*scene.fills, *scene.bodies)}
+
+
+def _smallest_grain(scene: Scene) -> float | None:
+    """Smallest radius that the fills can draw, none of which may pass between a tool's particles [m]."""
+    sizes = [fill.size for fill in scene.fills if fill.size]
+    least = [min(size.radii) if size.radii else size.low or size.mean for size in sizes]
+    return min(least, default=None)
 
 
 def _material_order(scene: Scene) -> list[str]:

@@ -34,7 +34,7 @@ def make_plate_world(tmp_path):
 
 def test_tool_carries_a_resting_grain(make_plate_world):
     world = make_plate_world([[0.0, 0.0, 0.0072]], gravity=[0.0, 0.0, -9.81], restitution=0.2, friction=0.8)
-    world.step(round(0.6 / world.time_step))
+    world.step(round(1.0 / world.time_step))
     world.observe()
     world.step(200)
     observation = world.observe()

@@ -132,10 +132,13 @@ def test_mass_properties_of_a_box():
     assert body.inertia == pytest.approx(expected, rel=1e-9, abs=1e-15)
 
 
-def test_open_mesh_has_no_mass(sphere):
+def test_an_open_shell_is_a_sheet_and_weighs_what_its_thickness_says(sphere):
     half = sphere.copy()
     half.update_faces(half.triangles_center[:, 2] > 0.0)
-    assert np.isnan(sample_body(half, radius=0.004).volume)
+    body = sample_body(half, radius=0.002, thickness=0.001)
+    assert any("sheets" in warning for warning in body.warnings)
+    assert body.volume == pytest.approx(half.area * 0.001, rel=0.01)
+    assert np.abs(np.linalg.norm(body.points, axis=1) - 0.05).max() < 1e-4  # one layer, in the sheet
 
 
 def test_same_seed_same_body(sphere):

@@ -1,0 +1,115 @@
+"""``python -m sampler MESH --radius R``: make a particle body and say what came out."""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from sampler.errors import MeshError
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line.
+
+    Returns:
+        0; 1 where the mesh or an option cannot be used; 130 where the user stopped it.
+    """
+    options = _parser().parse_args(arguments)
+    try:
+        return _run(options)
+    except MeshError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("stopped", file=sys.stderr)
+        return 130
+
+
+def _run(options: argparse.Namespace) -> int:
+    import warp as wp
+
+    wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
+    from sampler.cache import sample_file
+    from sampler.distance import SignedDistance
+    from sampler.location import locate_mesh
+    from sampler.reading import read_mesh
+    from sampler.report import report_table
+    from sampler.storage import save_body
+
+    begin = time.perf_counter()
+    path = locate_mesh(options.mesh)
+    recording = None
+    if options.rrd:
+        from sampler.recording import Recording
+
+        recording = Recording(options.rrd, read_mesh(path, options.scale), options.radius)
+    names = ("spacing", "seed", "device", "count", "grain", "inset", "thickness", "sheets")
+    bar = _Bar()
+    body = sample_file(
+        path,
+        options.radius,
+        options.scale,
+        cache=options.cache and not recording,
+        progress=bar.show,
+        observe=recording.particles if recording else None,
+        **{name: getattr(options, name) for name in names},
+    )
+    bar.end()
+    sampled = time.perf_counter()
+    mass = body.mass_properties(options.density, options.mass) if options.density or options.mass else None
+    seconds = {"sampling": sampled - begin}
+    if recording:
+        distance = SignedDistance(read_mesh(path, options.scale), options.device, options.thickness or 2.0 * options.radius)
+        recording.finish(body, distance)
+        seconds["recording"] = time.perf_counter() - sampled
+    if options.output:
+        save_body(options.output, body)
+    print(report_table(body, mass, seconds))
+    for written in (options.output, options.rrd):
+        if written:
+            print(f"wrote {written}")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser("python -m sampler", description="Turn a triangle mesh into a rigid body of even particles.")
+    parser.add_argument("mesh", help="path, file:// or package:// address of an STL, OBJ, PLY, DAE, glTF ... file")
+    parser.add_argument("--radius", type=float, required=True, metavar="R", help="of every particle [m]")
+    parser.add_argument("--count", type=int, metavar="N", help="number of particles, instead of a spacing")
+    parser.add_argument("--spacing", type=float, metavar="H", help="distance between neighbours [m] (default: 1.5 radii)")
+    parser.add_argument("--grain", type=float, metavar="R", help="radius of the smallest grain that must not pass [m]")
+    parser.add_argument(
+        "--scale", type=float, default=1.0, help="metres per unit of the file (default: 1; 0.001 for millimetres)"
+    )
+    parser.add_argument("--inset", action="store_true", help="centres one radius below the surface (default: on the surface)")
+    parser.add_argument("--thickness", type=float, metavar="T", help="of surfaces modelled without any [m] (default: 2 radii)")
+    parser.add_argument("--sheets", choices=("auto", "never", "always"), default="auto", help="whether open surfaces are sheets")
+    parser.add_argument("--density", type=float, help="[kg/m^3], for the report's mass and inertia")
+    parser.add_argument("--mass", type=float, help="[kg], instead of a density")
+    parser.add_argument("--seed", type=int, default=0, help="of the random start (default: 0)")
+    parser.add_argument("--device", default="cpu", help="Warp device (default: cpu)")
+    parser.add_argument("--no-cache", dest="cache", action="store_false", help="sample anew even if it was done before")
+    parser.add_argument("--rrd", type=Path, metavar="FILE", help="record mesh, field and relaxing particles for Rerun")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the body, .npz")
+    return parser
+
+
+class _Bar:
+    """A progress bar on a terminal; silent elsewhere."""
+
+    def __init__(self):
+        self._open = False
+
+    def show(self, share: float) -> None:
+        if sys.stderr.isatty():
+            full = round(40 * share)
+            print(f"\rsampling [{'#' * full}{'.' * (40 - full)}] {100.0 * share:3.0f} %", end="", file=sys.stderr, flush=True)
+            self._open = True
+
+    def end(self) -> None:
+        if self._open:
+            print(file=sys.stderr)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,64 @@
+"""Bodies that were sampled before, found again by the content of the mesh file, the options and the sampler's own code."""
+
+import contextlib
+import hashlib
+import os
+import time
+from pathlib import Path
+
+from sampler.body import ParticleBody
+from sampler.errors import MeshError
+from sampler.reading import read_mesh
+from sampler.sampling import sample_body
+from sampler.storage import load_body, save_body
+
+_ABANDONED = 3600.0  # [s] after which a half-written file belongs to a writer that was killed
+
+
+def cache_folder() -> Path:
+    """Where bodies are kept: ``SAMPLER_CACHE``, else ``sampler`` in ``XDG_CACHE_HOME`` or ``~/.cache``."""
+    given = os.environ.get("SAMPLER_CACHE")
+    return Path(given) if given else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "sampler"
+
+
+def sample_file(path: str | Path, radius: float, scale: float = 1.0, *, cache: bool = True, **options) -> ParticleBody:
+    """Read and sample a mesh file, or take what an earlier call with the same content and options has kept.
+
+    Args:
+        path: of the mesh.
+        radius: of every particle [m].
+        scale: metres per unit of the file.
+        cache: whether to look for and keep the body.
+        options: further ones of ``sample_body``.
+
+    Raises:
+        MeshError: as ``read_mesh`` and ``sample_body`` do.
+    """
+    path = Path(path)
+    place = cache_folder() / f"{_key(path, radius=radius, scale=scale, **options)}.npz" if cache and path.is_file() else None
+    if place:
+        with contextlib.suppress(MeshError):  # missing or damaged: sampled anew
+            return load_body(place)
+    body = sample_body(read_mesh(path, scale), radius, **options)
+    if place:
+        with contextlib.suppress(MeshError):  # a folder that cannot be written only costs time
+            save_body(place, body)
+            _sweep(place.parent)
+    return body
+
+
+def _key(path: Path, **options) -> str:
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.read_bytes())
+    shown = {name: value for name, value in options.items() if name not in ("progress", "observe") and value is not None}
+    digest.update(repr(sorted(shown.items())).encode() + path.suffix.lower().encode())
+    digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _sweep(folder: Path) -> None:
+    for left in folder.glob(".writing-*"):
+        with contextlib.suppress(OSError):
+            if time.time() - left.stat().st_mtime > _ABANDONED:
+                left.unlink()

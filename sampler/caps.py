@@ -1,0 +1,89 @@
+"""Closing holes: boundary loops of a component and the triangles of least area that span them."""
+
+import numpy as np
+
+from sampler.topology import edges_of
+
+_LONGEST = 80  # corners of a loop that are spanned with least area; longer loops are first cut at their flattest corners
+
+
+def close_holes(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Span all boundary loops of consistently oriented components.
+
+    Args:
+        vertices: shape (n, 3) [m].
+        faces: shape (m, 3).
+        component: of each face, shape (m,).
+
+    Returns:
+        Faces of the caps, oriented as their component, shape (k, 3); component of each, shape (k,); corners of the loop that
+        each helps to close, shape (k,).
+    """
+    caps, owners, lengths = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    for owner, loop in boundary_loops(faces, component):
+        cap = span_loop(vertices, loop)
+        caps.append(cap)
+        owners.append(np.full(len(cap), owner))
+        lengths.append(np.full(len(cap), len(loop)))
+    return np.concatenate(caps), np.concatenate(owners), np.concatenate(lengths)
+
+
+def boundary_loops(faces: np.ndarray, component: np.ndarray):
+    """Yield the component and the vertex numbers of each boundary loop, in the direction in which a cap runs along it."""
+    edges = edges_of(faces)
+    edge = np.repeat(np.arange(len(edges.ends)), edges.degree)
+    key = edge * (int(component.max()) + 1) + component[edges.face]
+    _, first, group = np.unique(key, return_index=True, return_inverse=True)
+    net = np.bincount(group, np.where(edges.forward, 1, -1)).astype(int)
+    follow: dict[tuple[int, int], list[int]] = {}
+    for k in np.flatnonzero(net):
+        low, high = edges.ends[edge[first[k]]].tolist()
+        owner = int(component[edges.face[first[k]]])
+        tail, head = (high, low) if net[k] > 0 else (low, high)
+        follow.setdefault((owner, tail), []).extend([head] * abs(net[k]))
+    for owner, start in list(follow):
+        while follow[owner, start]:
+            path, place = [start], {start: 0}
+            while follow.get((owner, path[-1])):
+                head = follow[owner, path[-1]].pop()
+                if head in place:
+                    loop = path[place[head] :]
+                    for vertex in loop[1:]:
+                        del place[vertex]
+                    path = path[: place[head] + 1]
+                    if len(loop) > 2:
+                        yield owner, np.array(loop)
+                else:
+                    place[head] = len(path)
+                    path.append(head)
+
+
+def span_loop(vertices: np.ndarray, loop: np.ndarray) -> np.ndarray:
+    """Triangles of least total area over a loop of vertices, shape (n - 2, 3) (dynamic programming, Barequet & Sharir 1995)."""
+    cut = []
+    loop = list(loop)
+    while len(loop) > _LONGEST:
+        corner = vertices[loop]
+        area = np.linalg.norm(np.cross(np.roll(corner, 1, axis=0) - corner, np.roll(corner, -1, axis=0) - corner), axis=1)
+        k = int(area.argmin())
+        cut.append([loop[k - 1], loop[k], loop[(k + 1) % len(loop)]])
+        del loop[k]
+    corner, number = vertices[loop], len(loop)
+    cost = np.zeros((number, number))
+    split = np.zeros((number, number), int)
+    for width in range(2, number):
+        for i in range(number - width):
+            j = i + width
+            between = corner[i + 1 : j]
+            area = 0.5 * np.linalg.norm(np.cross(between - corner[i], corner[j] - corner[i]), axis=1)
+            total = cost[i, i + 1 : j] + cost[i + 1 : j, j] + area
+            split[i, j] = i + 1 + int(total.argmin())
+            cost[i, j] = total.min()
+    waiting = [(0, number - 1)]
+    while waiting:
+        i, j = waiting.pop()
+        if j - i > 1:
+            k = split[i, j]
+            cut.append([loop[i], loop[k], loop[j]])
+            waiting += [(i, k), (k, j)]
+    return np.array(cut, np.int64)

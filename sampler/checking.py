@@ -1,0 +1,103 @@
+"""Damage that mesh readers pass over in silence: pointers, files cut off, faces without enough corners."""
+
+import re
+import struct
+from pathlib import Path
+
+from sampler.errors import MeshError
+
+_POINTER = b"version https://git-lfs"
+_STL_HEADER, _STL_TRIANGLE = 84, 50  # bytes
+_PLY_SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "float": 4, "double": 8}
+_PLY_SIZES |= {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "float32": 4, "float64": 8}
+
+
+def check_file(path: Path) -> None:
+    """Refuse a file that is no mesh or only part of one.
+
+    Raises:
+        MeshError: with the reason.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise MeshError(f"mesh {path.name}: cannot be read: {error.strerror}") from None
+    if data.startswith(_POINTER):
+        raise MeshError(f"mesh {path.name}: is a Git LFS pointer, not a mesh; run 'git lfs pull' where it comes from")
+    if not data.strip(b"\0 \r\n\t"):
+        raise MeshError(f"mesh {path.name}: is empty")
+    check = {".stl": _check_stl, ".obj": _check_obj, ".ply": _check_ply, ".off": _check_off, ".glb": _check_glb}
+    check.get(path.suffix.lower(), lambda name, data: None)(path.name, data)
+
+
+def is_text_stl(data: bytes) -> bool:
+    """Whether an STL file is text; binary files may begin with ``solid`` too."""
+    return data.lstrip()[:5].lower() == b"solid" and (b"facet" in data[:2000] or b"endsolid" in data[:2000])
+
+
+def _check_stl(name: str, data: bytes) -> None:
+    if is_text_stl(data):
+        if b"endsolid" not in data[-2000:]:
+            raise MeshError(f"mesh {name}: is cut off: it does not end with 'endsolid'; copy or export it again")
+        if data.count(b"vertex") % 3 or data.count(b"endfacet") * 3 != data.count(b"vertex"):
+            raise MeshError(f"mesh {name}: is damaged: its facets do not have three vertices each; export it again")
+        return
+    if len(data) < _STL_HEADER:
+        raise MeshError(f"mesh {name}: is cut off: {len(data)} bytes are too few for an STL file")
+    (promised,) = struct.unpack_from("<I", data, 80)
+    held = (len(data) - _STL_HEADER) // _STL_TRIANGLE
+    if promised > held:
+        raise MeshError(f"mesh {name}: is cut off: it promises {promised} triangles and holds {held}; copy or export it again")
+    if promised == 0:
+        raise MeshError(f"mesh {name}: has no triangles")
+
+
+def _check_obj(name: str, data: bytes) -> None:
+    """Readers drop faces they do not understand; a body with faces dropped would be wrong in silence."""
+    vertices = len(re.findall(rb"^\s*v\s", data, re.MULTILINE))
+    text = re.sub(rb"\\\r?\n", b" ", data)
+    for match in re.finditer(rb"^[ \t]*f[ \t]([^\r\n]*)", text, re.MULTILINE):
+        corners = match.group(1).split(b"#")[0].split()
+        try:
+            indices = [int(corner.split(b"/")[0]) for corner in corners]
+        except ValueError:
+            indices = []
+        if len(indices) < 3 or any(i == 0 or abs(i) > vertices for i in indices):
+            shown = match.group(0).decode(errors="replace").strip()
+            reason = "has too few corners" if len(indices) < 3 else f"refers to a vertex that is not among the {vertices}"
+            raise MeshError(f"mesh {name}: is corrupt: the face '{shown}' {reason}; export it again")
+    lines = data.rsplit(b"\n", 1)[-1].split()
+    if lines and lines[0] == b"v" and len(lines) < 4:
+        raise MeshError(f"mesh {name}: is cut off in the middle of its last vertex; copy or export it again")
+
+
+def _check_ply(name: str, data: bytes) -> None:
+    head, found, body = data.partition(b"end_header")
+    if not found:
+        raise MeshError(f"mesh {name}: its PLY header has no end; the file is cut off or no PLY file")
+    words = [line.split() for line in head.decode("latin-1").splitlines()]
+    ascii_file = any(line[:2] == ["format", "ascii"] for line in words)
+    needed, number, rows = 0, 0, 0
+    for line in words:
+        if line[:1] == ["element"]:
+            number = int(line[2])
+            rows += number
+        elif line[:1] == ["property"]:
+            # Lists hold three items where they describe triangles; fewer bytes than that is certainly cut off.
+            needed += number * (_PLY_SIZES.get(line[2], 1) if line[1] == "list" else _PLY_SIZES.get(line[1], 1))
+    held = len([row for row in body.splitlines()[1:] if row.strip()]) if ascii_file else len(body) - 1
+    if held < (rows if ascii_file else needed):
+        raise MeshError(f"mesh {name}: is cut off: its header promises more than it holds; copy or export it again")
+
+
+def _check_off(name: str, data: bytes) -> None:
+    rows = [row.split(b"#")[0].strip() for row in data.splitlines()]
+    words = b" ".join(row for row in rows if row).split()
+    numbers = [int(word) for word in words[1:3] if word.isdigit()]
+    if len(numbers) == 2 and len(words) < 4 + 3 * numbers[0] + 4 * numbers[1]:
+        raise MeshError(f"mesh {name}: is cut off: its header promises more than it holds; copy or export it again")
+
+
+def _check_glb(name: str, data: bytes) -> None:
+    if len(data) < 12 or struct.unpack_from("<I", data, 8)[0] > len(data):
+        raise MeshError(f"mesh {name}: is cut off: its header promises more bytes than it holds; copy or export it again")

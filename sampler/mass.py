@@ -1,0 +1,67 @@
+"""Mass properties of the solid that a surface encloses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class MassProperties:
+    """Of a rigid solid.
+
+    Attributes:
+        mass: [kg].
+        centre: of mass, mesh frame, shape (3,) [m].
+        inertia: about the centre, mesh axes, shape (3, 3) [kg m^2].
+        principal: moments of inertia, ascending, shape (3,) [kg m^2].
+        axes: unit vectors they belong to, as columns of a right-handed rotation, shape (3, 3).
+    """
+
+    mass: float
+    centre: np.ndarray
+    inertia: np.ndarray
+    principal: np.ndarray
+    axes: np.ndarray
+
+
+def integrate(triangles: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Volume, centre and inertia per unit density by the divergence theorem, exact for a closed surface.
+
+    Args:
+        triangles: outward, shape (n, 3, 3) [m].
+
+    Returns:
+        Volume [m^3], centre, shape (3,) [m], inertia about the centre, shape (3, 3) [m^5].
+    """
+    origin = triangles.mean(axis=(0, 1))
+    a, b, c = np.moveaxis(triangles - origin, 1, 0)
+    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0  # of tetrahedra with the origin
+    volume = float(volumes.sum())
+    total = a + b + c
+    first = (volumes @ total) / 4.0
+    corners = sum(np.einsum("n,ni,nj->ij", volumes, x, x) for x in (a, b, c, total)) / 20.0
+    if volume == 0.0:
+        return 0.0, origin, np.full((3, 3), np.nan)
+    centre = first / volume
+    second = corners - volume * np.outer(centre, centre)
+    return volume, origin + centre, np.trace(second) * np.eye(3) - second
+
+
+def is_physical(volume: float, centre: np.ndarray, inertia: np.ndarray, low: np.ndarray, high: np.ndarray) -> bool:
+    """Whether a solid within a box can have such a volume, centre and inertia."""
+    if not (np.isfinite(volume) and volume > 0.0 and np.all(np.isfinite(centre)) and np.all(np.isfinite(inertia))):
+        return False
+    size = high - low
+    within = np.all(centre >= low - 1e-9 * size.max()) and np.all(centre <= high + 1e-9 * size.max())
+    moment = np.linalg.eigvalsh(inertia)
+    return bool(
+        within and moment[0] > 0.0 and moment[0] + moment[1] >= moment[2] * (1.0 - 1e-9) and volume <= 1.001 * np.prod(size)
+    )
+
+
+def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Principal moments, ascending, shape (3,), and a right-handed rotation to their axes, shape (3, 3)."""
+    moment, axes = np.linalg.eigh(inertia)
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 2] = -axes[:, 2]
+    return moment, axes

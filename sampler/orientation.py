@@ -1,0 +1,108 @@
+"""Turning faces so that neighbours agree and solids look outward."""
+
+import numpy as np
+
+from sampler.surface import Surface
+from sampler.topology import Edges, edges_of, link_items
+
+
+def agree_faces(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, int]:
+    """Turn faces so that neighbours run along their common edges in opposite directions.
+
+    Where more than two faces share an edge, those next to one another around it should agree; a majority of such edges decides
+    for each pair of pieces.
+
+    Returns:
+        Faces, shape (n, 3); component of each, shape (n,); piece without many-sided edges that each belongs to, shape (n,);
+        number of faces turned; number of edges that contradict the rest.
+    """
+    edges = edges_of(faces)
+    pair = edges.of(2)
+    a, b = edges.face[pair].T
+    turn = edges.forward[pair[:, 0]] == edges.forward[pair[:, 1]]
+    group, turned, clashes = link_items(len(faces), a, b, turn)
+    piece = group
+    if np.any(edges.degree > 2):
+        a, b, turn = _many_sided(vertices, faces, edges, group, turned)
+        joined, flip, _ = link_items(int(group.max()) + 1, a, b, turn)
+        turned, group = turned ^ flip[group], joined[group]
+    area = Surface.areas_of(vertices[faces])
+    minority = 2.0 * np.bincount(group, area * turned) > np.bincount(group, area)
+    turned ^= minority[group]
+    return np.where(turned[:, None], faces[:, ::-1], faces), group, piece, int(turned.sum()), clashes
+
+
+def _many_sided(vertices: np.ndarray, faces: np.ndarray, edges: Edges, group: np.ndarray, turned: np.ndarray):
+    """Pairs of pieces that meet at edges with more than two faces, most decided first, and whether one of them must be turned."""
+    votes: dict[tuple[int, int], int] = {}
+    for k in np.flatnonzero(edges.degree > 2):
+        half = np.arange(edges.start[k], edges.start[k + 1])
+        face = edges.face[half]
+        if np.all(group[face] == group[face[0]]):
+            continue
+        low, high = vertices[edges.ends[k]]
+        axis = (high - low) / (np.linalg.norm(high - low) or 1.0)
+        tip = vertices[faces[face]].sum(axis=1) - low - high  # the corner opposite to the edge
+        away = tip - low - np.outer((tip - low) @ axis, axis)
+        length = np.linalg.norm(away, axis=1)
+        side = away[length.argmax()] / (length.max() or 1.0)
+        order = np.argsort(np.arctan2(away @ np.cross(axis, side), away @ side))
+        runs = edges.forward[half] ^ turned[face]
+        for i, j in zip(order, np.roll(order, -1), strict=True):
+            p, q = int(group[face[i]]), int(group[face[j]])
+            if p != q:
+                votes[min(p, q), max(p, q)] = votes.get((min(p, q), max(p, q)), 0) + (1 if runs[i] == runs[j] else -1)
+    ranked = sorted((pair for pair in votes if votes[pair]), key=lambda pair: -abs(votes[pair]))
+    a, b = (np.array([pair[k] for pair in ranked], int) for k in (0, 1))
+    return a, b, np.array([votes[pair] > 0 for pair in ranked], bool)
+
+
+def face_outward(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray, sheet: np.ndarray) -> tuple[np.ndarray, int]:
+    """Turn solids that face inward, but not the cavities of others.
+
+    Args:
+        vertices: shape (n, 3) [m].
+        faces: closed or nearly, shape (m, 3).
+        component: of each face, shape (m,).
+        sheet: faces without an inside, which stay as they are, shape (m,).
+
+    Returns:
+        Faces and the number of components turned.
+    """
+    triangles = vertices[faces]
+    local = triangles - triangles.mean(axis=(0, 1))
+    part = np.einsum("ij,ij->i", local[:, 0], np.cross(local[:, 1], local[:, 2])) / 6.0
+    volume = np.bincount(component, np.where(sheet, 0.0, part))
+    all_turned = volume.sum() < 0.0
+    inward = (volume > 0.0) if all_turned else (volume < 0.0)
+    if inward.any() and not inward.all():
+        outer = ~inward[component] & ~sheet
+        around = Surface(triangles[outer][:, ::-1] if all_turned else triangles[outer])
+        first = np.array([np.flatnonzero(component == c)[0] for c in np.flatnonzero(inward)])
+        nested = around.winding(triangles[first].mean(axis=1)) > 0.5
+        inward[np.flatnonzero(inward)[nested]] = False
+    turned = inward ^ all_turned
+    turned &= volume != 0.0
+    return np.where(turned[component][:, None], faces[:, ::-1], faces), int(turned.sum())
+
+
+def turn_pieces(triangles: np.ndarray, piece: np.ndarray, around: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Find pieces that face inward in spite of their neighbours, and faces that have the outside on both sides.
+
+    Args:
+        triangles: shape (n, 3, 3) [m].
+        piece: of each triangle, shape (n,).
+        around: all surfaces.
+
+    Returns:
+        Faces to turn, shape (n,), and faces without an inside, shape (n,).
+    """
+    area = Surface.areas_of(triangles)
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    centre, step = triangles.mean(axis=1), 2e-5 * around.unit * normal
+    before, behind = around.winding(centre + step), around.winding(centre - step)
+    inward = (before < -0.5) & (np.abs(behind) < 0.5)
+    outward = (behind > 0.5) & (np.abs(before) < 0.5)
+    votes = np.bincount(piece, area * inward) > np.bincount(piece, area * outward)
+    return votes[piece], (np.abs(before) < 0.5) & (np.abs(behind) < 0.5)

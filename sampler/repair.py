@@ -1,0 +1,230 @@
+"""Mending a mesh step by step, and saying what was done.
+
+What leaves here is one list of consistently outward triangles: closed solids, and sheets (surfaces modelled without thickness).
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import trimesh
+
+from sampler.caps import close_holes
+from sampler.errors import MeshError
+from sampler.orientation import agree_faces, face_outward, turn_pieces
+from sampler.reading import check_mesh
+from sampler.surface import Surface
+from sampler.topology import edges_of, link_items, merge_points
+from sampler.welding import sew_edges
+
+SOLID, CAP, SHEET = 0, 1, 2
+
+_SHEET = 0.10  # a component is a sheet if closing it takes more area than this share of its own
+_ENCLOSED = 0.9  # share of the area that must have an inside for loose pieces to count as one solid
+_FEW = 8  # faces of a component in which a hole of three corners is nothing special
+_SCATTERED = 50  # open pieces from which a mesh is likely to be a cracked solid
+_CRUMB = 0.01  # share of the area below which one of many open pieces is part of a cracked surface
+_LOOSE = 0.5  # share of the area in single triangles from which a mesh is a soup
+
+
+@dataclass
+class RepairReport:
+    """What was found and mended.
+
+    Attributes:
+        steps: what was done and how often, in order.
+        warnings: what the user should know, one sentence each.
+    """
+
+    steps: dict[str, int] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class RepairedMesh:
+    """Triangles after repair.
+
+    Attributes:
+        vertices: shape (n, 3) [m].
+        faces: outward, shape (m, 3).
+        kind: of each face, ``SOLID``, ``CAP`` (closes a hole, not in the file) or ``SHEET``, shape (m,).
+        component: of each face, shape (m,).
+        closed: all solids are closed, so that their winding numbers are whole.
+        report: what was done.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    kind: np.ndarray
+    component: np.ndarray
+    closed: bool
+    report: RepairReport
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """Corners, shape (m, 3, 3) [m]."""
+        return self.vertices[self.faces]
+
+    @property
+    def diagonal(self) -> float:
+        """Of the bounding box [m]."""
+        return float(np.linalg.norm(np.ptp(self.triangles.reshape(-1, 3), axis=0)))
+
+
+def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
+    """Merge, clean, sew, reorient and close a mesh.
+
+    Args:
+        mesh: in metres.
+        sheets: ``auto`` takes an open component for a sheet where closing it would take more than a tenth of its area;
+            ``never`` closes all, ``always`` none.
+
+    Raises:
+        MeshError: if there are no sound triangles, or they are loose and enclose nothing.
+    """
+    if sheets not in ("auto", "never", "always"):
+        raise MeshError(f"sheets must be auto, never or always, got '{sheets}'")
+    check_mesh(mesh)
+    report = RepairReport()
+    vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
+    same = merge_points(vertices, 0.0)
+    report.steps["vertices merged"] = int((same != np.arange(len(same))).sum())
+    faces = _drop(same[faces], report)
+    sewn = sew_edges(vertices, faces)
+    report.steps["edges sewn"] = int((sewn != np.arange(len(sewn))).sum())
+    if report.steps["edges sewn"]:
+        faces = _drop(sewn[faces], report)
+    faces, component, piece, report.steps["faces turned"], clashes = agree_faces(vertices, faces)
+    caps, owner, corners = close_holes(vertices, faces, component)
+    area = np.bincount(component, Surface.areas_of(vertices[faces]))
+    sheet = _sheets(sheets, component, area, owner, corners, Surface.areas_of(vertices[caps]))
+    enclosing = sheets == "auto" and sheet.sum() > 1 and _enclosing(vertices[faces], sheet[component], sheet.sum() > _SCATTERED)
+    if not enclosing and sheets != "never":
+        _refuse_soup(component, area, sheet)
+    keep = ~sheet[owner]
+    loose = sheet.copy()
+    crumbs = sheet & (area < _CRUMB * area.sum())
+    if enclosing or (crumbs.sum() > _SCATTERED and sheets == "auto"):
+        sheet = sheet & ~crumbs & (not enclosing)
+        report.warnings.append(f"{crumbs.sum()} small open pieces are taken for parts of one cracked surface")
+        enclosing = True
+    kind = np.where(sheet[component], SHEET, SOLID)
+    report.steps["holes closed"] = round(float((1.0 / (corners[keep] - 2)).sum()))  # a loop of n corners takes n - 2 faces
+    report.steps["sheets"] = int(sheet.sum())
+    faces = np.concatenate([faces, caps[keep]])
+    component = np.concatenate([component, owner[keep]])
+    kind = np.concatenate([kind, np.full(int(keep.sum()), CAP)])
+    faces, report.steps["components turned"] = face_outward(vertices, faces, component, loose[component])
+    asked = np.flatnonzero((kind == SOLID) & ~loose[component])
+    if len(asked) and int(piece.max()) >= len(area):
+        faces, kind = _mend_pieces(vertices, faces, kind, piece, asked, report)
+    large = Surface.areas_of(vertices[caps[keep & (corners > 3)]]).sum()
+    _warn(report, float(large / area.sum()), int((keep & (corners > 3)).sum()), clashes)
+    return RepairedMesh(vertices, faces, kind, component, not enclosing, report)
+
+
+def _drop(faces: np.ndarray, report: RepairReport) -> np.ndarray:
+    """Drop triangles with a corner twice, and all but one of those with the same corners; both where two solids touch."""
+    degenerate = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
+    faces = faces[~degenerate]
+    if not len(faces):
+        raise MeshError("mesh: all its triangles are degenerate")
+    order = np.argsort(faces, axis=1)
+    even = np.isin(order @ [9, 3, 1], [5, 15, 19])  # 012, 120, 201
+    corners = np.take_along_axis(faces, order, axis=1)
+    number = int(faces.max()) + 1
+    if number < 2_000_000:  # the product fits 64 bits
+        key = (corners[:, 0] * number + corners[:, 1]) * number + corners[:, 2]
+    else:
+        key = merge_points(corners.astype(float), 0.0)
+    _, first, group = np.unique(key, return_index=True, return_inverse=True)
+    keep = np.zeros(len(faces), bool)
+    keep[first] = True
+    opposed = np.zeros(len(first), bool)
+    opposed[group[even]] = True
+    back = np.zeros(len(first), bool)
+    back[group[~even]] = True
+    opposed &= back
+    keep[first[_interfaces(faces[first], opposed)]] = False
+    for name, count in (("degenerate faces dropped", degenerate.sum()), ("duplicate faces dropped", (~keep).sum())):
+        report.steps[name] = report.steps.get(name, 0) + int(count)
+    return faces[keep]
+
+
+def _interfaces(faces: np.ndarray, opposed: np.ndarray) -> np.ndarray:
+    """Of faces that were there in both directions, those that part two solids: all around their rim two others meet."""
+    if not opposed.any() or opposed.all():
+        return np.zeros(len(faces), bool)
+    edges = edges_of(faces)
+    edge = np.repeat(np.arange(len(edges.ends)), edges.degree)
+    own = np.bincount(edge, opposed[edges.face])
+    others = edges.degree - own
+    inner = np.flatnonzero(own == 2)
+    halves = np.flatnonzero(opposed[edges.face])
+    pairs = halves[np.isin(edge[halves], inner)]
+    region, _, _ = link_items(len(faces), edges.face[pairs[0::2]], edges.face[pairs[1::2]])
+    wrong = halves[(own[edge[halves]] != 2) & ((own[edge[halves]] != 1) | (others[edge[halves]] != 2))]
+    rim = halves[(own[edge[halves]] == 1) & (others[edge[halves]] == 2)]
+    parting = np.zeros(len(faces), bool)
+    parting[region[edges.face[rim]]] = True
+    parting[region[edges.face[wrong]]] = False
+    return opposed & parting[region]
+
+
+def _mend_pieces(vertices, faces, kind, piece, asked, report) -> tuple[np.ndarray, np.ndarray]:
+    """Turn pieces between many-sided edges that still face inward; what then has the outside on both sides is a sheet."""
+    for last in (False, True):
+        turn, free = turn_pieces(vertices[faces[asked]], piece[asked], Surface(vertices[faces[kind != SHEET]]))
+        if last or not turn.any():
+            break
+        faces[asked[turn]] = faces[asked[turn]][:, ::-1]
+        report.steps["faces turned"] += int(turn.sum())
+    kind[asked[free]] = SHEET
+    report.steps["faces of double walls"] = int(free.sum())
+    return faces, kind
+
+
+def _sheets(choice: str, component, area, owner, corners, cap_areas) -> np.ndarray:
+    """Components that are sheets. A hole of three corners in more than a few faces is a face that was lost."""
+    if choice == "never":
+        return np.zeros(len(area), bool)
+    if choice == "always":
+        return np.bincount(owner, minlength=len(area)) > 0
+    lost = (corners == 3) & (np.bincount(component)[owner] > _FEW)
+    cap_area = np.bincount(owner[~lost], cap_areas[~lost], minlength=len(area))
+    return cap_area > _SHEET * area
+
+
+def _enclosing(triangles: np.ndarray, open_: np.ndarray, lenient: bool) -> bool:
+    """Whether open pieces, with everything else, have an inside behind and an outside before nearly all of their area."""
+    surface = Surface(triangles)
+    asked = np.flatnonzero(open_ & (surface.areas > 0.0))
+    centre, step = surface.triangles[asked].mean(axis=1), 1e-4 * surface.unit * surface.normals[asked]
+    before, behind = surface.winding(centre + step), surface.winding(centre - step)
+    doubt = 0.25 if lenient else 0.1
+    sound = (before < doubt) & (behind > 1.0 - doubt)
+    inverted = (before < doubt - 1.0) & (behind > -doubt)
+    area = surface.areas[asked]
+    return max(area[sound].sum(), area[inverted].sum()) > _ENCLOSED * area.sum()
+
+
+def _refuse_soup(component: np.ndarray, area: np.ndarray, sheet: np.ndarray) -> None:
+    single = sheet & (np.bincount(component) == 1)
+    if area[single].sum() > _LOOSE * area.sum():
+        raise MeshError(
+            f"mesh: {single.sum()} of its {len(component)} triangles are loose and enclose nothing; it has no inside. "
+            "Export it as a connected surface"
+        )
+
+
+def _warn(report: RepairReport, hole: float, faces: int, clashes: int) -> None:
+    if faces:
+        report.warnings.append(
+            f"holes were closed flat with {faces} faces, {100.0 * hole:.2g} % of the surface; "
+            "sign, volume and inertia are uncertain there"
+        )
+    if clashes:
+        report.warnings.append(f"{clashes} edges join faces that cannot be oriented consistently (one-sided or self-touching)")
+    if report.steps["sheets"]:
+        report.warnings.append(
+            f"{report.steps['sheets']} components are open surfaces; they are taken for sheets and get a thickness"
+        )

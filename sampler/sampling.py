@@ -1,0 +1,177 @@
+"""From a mesh to a particle body: repair, skin, particles, mass."""
+
+from collections.abc import Callable
+
+import numpy as np
+import trimesh
+
+from sampler.body import ParticleBody
+from sampler.errors import MeshError
+from sampler.inset import inset_particles
+from sampler.mass import integrate, is_physical
+from sampler.repair import SHEET, RepairedMesh, repair_mesh
+from sampler.sheets import closed_triangles
+from sampler.skin import Skin, free_triangles
+from sampler.spreading import Observer, lattice_spacing, measure_evenness, particle_count, spread_particles
+from sampler.surface import Surface
+
+SPACING = 1.5  # default distance between neighbours in particle radii; below 2 so that particles overlap into a closed skin
+MOST = 2_000_000  # particles, more are not meant
+
+_CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest grain
+_COVERED = 0.80  # coverage to expect, in spacings
+_TRIES, _FINER = 4, 0.92
+_WALL_SAMPLES = 4000
+_PLACES = 60  # per particle, to move buried ones to
+
+Progress = Callable[[float], None]
+
+
+def sample_body(
+    mesh: trimesh.Trimesh | RepairedMesh,
+    radius: float,
+    spacing: float | None = None,
+    seed: int = 0,
+    device: str = "cpu",
+    progress: Progress = lambda share: None,
+    *,
+    count: int | None = None,
+    grain: float | None = None,
+    inset: bool = False,
+    thickness: float | None = None,
+    sheets: str = "auto",
+    observe: Observer | None = None,
+) -> ParticleBody:
+    """Sample a mesh into a particle body.
+
+    Args:
+        mesh: in metres.
+        radius: of every particle [m].
+        spacing: wanted distance between neighbours [m]; 1.5 radii if None, less where ``grain`` asks for it.
+        seed: of the random start.
+        device: Warp device.
+        progress: called with the share of the work done, 0 to 1.
+        count: wanted number of particles, instead of a spacing.
+        grain: radius of the smallest grain that must not pass [m].
+        inset: put the centres one radius below the surface, so that the body keeps its outer size; they lie on it if False.
+        thickness: of sheets [m]; up to two radii, and if None, one layer of particles lies in the sheet itself.
+        sheets: which open components are sheets, see ``repair_mesh``.
+        observe: called with the particles, shape (n, 3) [m], as they relax.
+
+    Raises:
+        MeshError: if a number is not positive, the mesh cannot be repaired, the particles would be too many to be meant, or a
+            grain could pass.
+    """
+    given = {"radius": radius, "spacing": spacing, "count": count, "smallest grain": grain, "sheet thickness": thickness}
+    for name, value in given.items():
+        if value is not None and not (np.isfinite(value) and value > 0.0):
+            raise MeshError(f"particle {name} must be positive, got {value}")
+    repaired = mesh if isinstance(mesh, RepairedMesh) else repair_mesh(mesh, sheets)
+    thickness = 2.0 * radius if thickness is None else thickness
+    closed, owner = closed_triangles(repaired, thickness)
+    rough = float(Surface.areas_of(closed).sum())
+    fine = _spacing(radius, spacing, count, grain, rough)
+    around = Surface(closed, device)
+    free, parent = free_triangles(closed, around, fine)
+    solid, cut = around, not np.array_equal(np.unique(parent, return_counts=True)[1], np.ones(len(free)))
+    warnings = list(repaired.report.warnings)
+    volume, centre, inertia = _mass(closed, free, parent, around, warnings)
+    if thickness <= 2.0 * radius and np.any(owner == SHEET):
+        # One layer in the sheets; the skin of the solids ends only where it is buried in other solids.
+        free = repaired.triangles[repaired.kind == SHEET]
+        cut = np.any(owner != SHEET)
+        if cut:
+            solid = Surface(closed[owner != SHEET], device)
+            sheet, _ = free_triangles(free, solid, fine, two_sided=True)
+            free = np.concatenate([free_triangles(solid.triangles, solid, fine)[0], sheet])
+        free = free[Surface.areas_of(free) > 0.0]
+    if not len(free):
+        raise MeshError("mesh: no part of its surface has an outside; check its orientation")
+    skin = Skin(free, device)
+    area = float(skin.areas.sum())
+    for attempt in range(_TRIES):
+        number = count if count is not None else particle_count(area, fine)
+        if number > MOST:
+            raise MeshError(
+                f"a surface of {area:.3g} m^2 would need {number:.2g} particles of radius {radius:.3g} m; "
+                "check the mesh's scale, or take larger particles"
+            )
+        points, normals = spread_particles(skin, number, seed, progress, observe)
+        if cut:
+            points, normals = _unbury(points, normals, skin, solid)
+        evenness = measure_evenness(skin, points, normals)
+        h = lattice_spacing(area, len(points))
+        if grain is None or evenness.coverage * h < radius + grain:
+            break
+        if count is not None or attempt == _TRIES - 1:
+            raise MeshError(
+                f"a grain of radius {grain:.3g} m could pass: some places lie {evenness.coverage * h:.3g} m from the nearest "
+                f"particle of radius {radius:.3g} m; take more or larger particles"
+            )
+        fine *= _FINER
+    if inset:
+        points, kept = inset_particles(points, normals, around, radius, h)
+        normals = normals[kept]
+    return ParticleBody(
+        points=points,
+        normals=normals,
+        radius=radius,
+        spacing=h,
+        area=area,
+        volume=volume,
+        centre=centre,
+        inertia=inertia,
+        triangles=closed,
+        thinnest_wall=thinnest_wall(around),
+        evenness=evenness,
+        steps=dict(repaired.report.steps),
+        warnings=tuple(warnings),
+    )
+
+
+def _unbury(points: np.ndarray, normals: np.ndarray, skin: Skin, solid: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Move particles at the border of a cut surface that are still a little inside another part to the nearest free place."""
+    step = 2e-5 * solid.unit
+    buried = np.flatnonzero(np.abs(solid.winding(points + step * normals)) > 0.5)
+    if not len(buried):
+        return points, normals
+    places, up = skin.sample(_PLACES * len(points), np.random.default_rng(2))
+    open_ = np.abs(solid.winding(places + step * up)) < 0.5
+    places, up = places[open_], up[open_]
+    for i in buried:
+        k = int(np.argmin(np.linalg.norm(places - points[i], axis=1)))
+        points[i], normals[i] = places[k], up[k]
+    return points, normals
+
+
+def thinnest_wall(surface: Surface) -> float:
+    """Shortest way [m] through the solid between two skins that face away from one another; infinite if there are none."""
+    points, normals = Skin(surface.triangles).sample(_WALL_SAMPLES, np.random.default_rng(0))
+    step = 1e-5 * surface.unit
+    face, way = surface.cast(points - step * normals, -normals)
+    opposed = (face >= 0) & (np.einsum("ij,ij->i", surface.normals[face], normals) < -0.9)
+    return float(way[opposed].min() + step) if opposed.any() else float("inf")
+
+
+def _spacing(radius, spacing, count, grain, area) -> float:
+    if count is not None:
+        if spacing is not None:
+            raise MeshError("give either the spacing or the count of the particles, not both")
+        return lattice_spacing(area, count)
+    fine = SPACING * radius if spacing is None else spacing
+    return fine if grain is None else min(fine, _CLOSED * (radius + grain) / _COVERED)
+
+
+def _mass(closed, free, parent, around, warnings) -> tuple[float, np.ndarray, np.ndarray]:
+    """From all triangles where none is buried, else from the free parts."""
+    whole = np.bincount(parent, minlength=len(closed)) == (Surface.areas_of(closed) > 0.0)
+    if np.all(whole):
+        volume, centre, inertia = integrate(closed)
+    else:
+        volume, centre, inertia = integrate(free)
+        warnings.append("parts of the surface are buried in others; volume and inertia are those of the union, to about 0.1 %")
+    low, high = closed.min(axis=(0, 1)), closed.max(axis=(0, 1))
+    if is_physical(volume, centre, inertia, low, high):
+        return volume, centre, inertia
+    warnings.append("the surface encloses no sound volume; mass and inertia must be given by hand")
+    return float("nan"), around.triangles.mean(axis=(0, 1)), np.full((3, 3), np.nan)

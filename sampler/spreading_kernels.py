@@ -1,0 +1,185 @@
+"""Kernels that move particles over a surface and measure the gaps between them; lengths in units of the mesh's diagonal."""
+
+import warp as wp
+
+from sampler.surface import nearest_face
+
+MODULE = "sampler_spreading"
+
+_SAME = wp.constant(-0.2)  # cosine between normals from which two places lie on one skin
+_OTHER = wp.constant(-0.7)  # and below which they lie on different skins
+_ACROSS = wp.constant(0.8)  # range of the repulsion between skins, of that on one skin
+_FARTHEST = wp.constant(0.3)  # of a step, in spacings
+
+
+@wp.func
+def same_skin(a: wp.vec3, b: wp.vec3) -> float:
+    """1 for places on one skin, 0 for the two skins of a wall, smooth between."""
+    share = wp.clamp((wp.dot(a, b) - _OTHER) / (_SAME - _OTHER), 0.0, 1.0)
+    return share * share * (3.0 - 2.0 * share)
+
+
+@wp.func
+def way_along(p: wp.vec3, up: wp.vec3, q: wp.vec3, other: wp.vec3) -> float:
+    """Distance between places of a surface: straight on one skin, else around the edge in which their planes meet."""
+    between = q - p
+    if wp.dot(up, other) >= _SAME:
+        return wp.length(between)
+    edge = wp.cross(up, other)
+    square = wp.length_sq(edge)
+    if square < 1.0e-4:  # the two skins of a wall
+        return 1.0e6
+    # The line's foot f from p: f lies in both planes and (f - p) has no part along the edge.
+    to_edge = wp.cross(edge, up) * (wp.dot(between, other) / square)
+    from_edge = wp.cross(edge, other) * (wp.dot(between, up) / square)
+    along = wp.dot(between, edge)
+    across = wp.length(to_edge) + wp.length(from_edge)
+    return wp.sqrt(across * across + along * along / square)
+
+
+@wp.func
+def repulsion(distance: float, spacing: float) -> float:
+    """Gaussian that has faded at two spacings (source document A)."""
+    share = distance / spacing
+    return wp.max(wp.exp(-2.0 * share * share) - wp.exp(-8.0), 0.0)
+
+
+@wp.kernel(enable_backward=False, module=MODULE)
+def push_apart(
+    grid: wp.uint64,
+    mesh: wp.uint64,
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    corners: wp.array(dtype=wp.vec3),
+    face_normals: wp.array(dtype=wp.vec3),
+    held: wp.array(dtype=int),
+    spacing: float,
+    strength: float,
+    first: int,
+    moved: wp.array(dtype=wp.vec3),
+    moved_normals: wp.array(dtype=wp.vec3),
+    crowding: wp.array(dtype=float),
+):
+    """Push each point away from its neighbours, less so from those on another skin, and bring it back to the surface."""
+    i = first + wp.tid()
+    here = points[i]
+    up = normals[i]
+    moved[i] = here
+    moved_normals[i] = up
+    if held[i] != 0:
+        return
+    push = wp.vec3(0.0)
+    crowd = float(0.0)
+    for j in wp.hash_grid_query(grid, here, 2.0 * spacing):
+        if j != i:
+            away = here - points[j]
+            distance = wp.length(away)
+            if distance < 2.0 * spacing:
+                same = same_skin(up, normals[j])
+                # The two skins of a thin wall only keep their particles from lying on top of one another.
+                weight = repulsion(distance, spacing * (_ACROSS + (1.0 - _ACROSS) * same))
+                crowd += same * weight
+                push += away * (weight / wp.max(distance, 1.0e-3 * spacing))
+    crowding[i] = crowd
+    step = push * strength
+    step *= wp.min(1.0, _FARTHEST * spacing / wp.max(wp.length(step), 1.0e-12))
+    there = here + step
+    face = nearest_face(mesh, there, 1.01 * wp.length(step) + 1.0e-3 * spacing)
+    if face >= 0:
+        moved[i] = closest_point(corners[3 * face], corners[3 * face + 1], corners[3 * face + 2], there)
+        moved_normals[i] = face_normals[face]
+
+
+@wp.func
+def closest_on_edge(a: wp.vec3, b: wp.vec3, p: wp.vec3) -> wp.vec3:
+    """Closest point of a line between two ends."""
+    along = b - a
+    square = wp.dot(along, along)
+    if square == 0.0:
+        return a
+    return a + along * wp.clamp(wp.dot(p - a, along) / square, 0.0, 1.0)
+
+
+@wp.func
+def closest_point(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3) -> wp.vec3:
+    """Closest point of a triangle."""
+    n = wp.cross(b - a, c - a)
+    area = wp.dot(n, n)
+    inside = area > 0.0
+    if wp.dot(wp.cross(b - a, p - a), n) < 0.0:
+        inside = False
+    if wp.dot(wp.cross(c - b, p - b), n) < 0.0:
+        inside = False
+    if wp.dot(wp.cross(a - c, p - c), n) < 0.0:
+        inside = False
+    if inside:
+        return p - n * (wp.dot(p - a, n) / area)
+    best = closest_on_edge(a, b, p)
+    other = closest_on_edge(b, c, p)
+    if wp.length_sq(other - p) < wp.length_sq(best - p):
+        best = other
+    other = closest_on_edge(c, a, p)
+    if wp.length_sq(other - p) < wp.length_sq(best - p):
+        best = other
+    return best
+
+
+@wp.kernel(enable_backward=False, module=MODULE)
+def throw_darts(
+    grid: wp.uint64,
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    apart: float,
+    wanted: int,
+    kept: wp.array(dtype=int),
+):
+    """Keep points one after another if none kept lies nearer than ``apart`` on the same skin; one thread."""
+    number = int(0)
+    for i in range(points.shape[0]):
+        if number < wanted:
+            here = points[i]
+            free = int(1)
+            for j in wp.hash_grid_query(grid, here, apart):
+                if kept[j] == 1:
+                    distance = wp.length(points[j] - here)
+                    same = same_skin(normals[i], normals[j])
+                    if distance < apart * (0.5 + 0.5 * same):
+                        free = 0
+            if free == 1:
+                kept[i] = 1
+                number += 1
+
+
+@wp.kernel(enable_backward=False, module=MODULE)
+def find_gaps(
+    grid: wp.uint64,
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    samples: wp.array(dtype=wp.vec3),
+    sample_normals: wp.array(dtype=wp.vec3),
+    reach: float,
+    first: int,
+    distance: wp.array(dtype=float),
+    own_distance: wp.array(dtype=float),
+):
+    """Distance of samples from the nearest particle, and from the nearest one on their own skin; at most ``reach``."""
+    i = first + wp.tid()
+    here = samples[i]
+    best = reach
+    own = reach
+    for j in wp.hash_grid_query(grid, here, reach):
+        best = wp.min(best, wp.length(points[j] - here))
+        own = wp.min(own, way_along(here, sample_normals[i], points[j], normals[j]))
+    distance[i] = best
+    own_distance[i] = own
+
+
+@wp.kernel(enable_backward=False, module=MODULE)
+def find_nearest(grid: wp.uint64, points: wp.array(dtype=wp.vec3), reach: float, first: int, distance: wp.array(dtype=float)):
+    """Distance of each particle from its nearest neighbour, at most ``reach``."""
+    i = first + wp.tid()
+    best = reach
+    for j in wp.hash_grid_query(grid, points[i], reach):
+        if j != i:
+            best = wp.min(best, wp.length(points[j] - points[i]))
+    distance[i] = best

@@ -1,0 +1,241 @@
+"""Exact questions to a set of triangles: closest point, generalized winding number, rays; on the CPU's cores or a GPU."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+
+import numpy as np
+import warp as wp
+
+_TOGETHER = 2000  # points below which a second core is not worth its start
+
+
+# Warp's own query loses up to 1e-4 of the diagonal on long thin triangles: it measures them in single precision.
+_NEAREST = """
+    using namespace wp;
+    const Mesh mesh = mesh_get(id);
+    int stack[BVH_QUERY_STACK_SIZE];
+    int count = 1, best = -1;
+    stack[0] = *mesh.bvh.root;
+    double least = (double)limit * limit;
+    while (count) {
+        const int node = stack[--count];
+        const BVHPackedNodeHalf low = bvh_load_node(mesh.bvh.node_lowers, node);
+        const BVHPackedNodeHalf high = bvh_load_node(mesh.bvh.node_uppers, node);
+        if (distance_to_aabb_sq(p, vec3(low.x, low.y, low.z), vec3(high.x, high.y, high.z)) > least * 1.000001) continue;
+        if (low.b) {
+            for (int k = low.i; k < (int)high.i; ++k) {
+                const int face = mesh.bvh.primitive_indices[k];
+                const vec3d point(p[0], p[1], p[2]);
+                vec3d corner[3];
+                for (int c = 0; c < 3; ++c) {
+                    const vec3 x = mesh.points[mesh.indices[3 * face + c]];
+                    corner[c] = vec3d(x[0], x[1], x[2]) - point;
+                }
+                const vec3d u = corner[1] - corner[0], v = corner[2] - corner[0], n = cross(u, v);
+                const double area = dot(n, n);
+                double distance = 1e300;
+                bool within = area > 0.0;
+                for (int c = 0; c < 3; ++c) {
+                    const vec3d a = corner[c], along = corner[(c + 1) % 3] - a;
+                    if (dot(cross(along, a), n) > 0.0) within = false;
+                    const double square = dot(along, along);
+                    double share = square > 0.0 ? -dot(a, along) / square : 0.0;
+                    share = share < 0.0 ? 0.0 : (share > 1.0 ? 1.0 : share);
+                    const vec3d near = a + share * along;
+                    const double d = dot(near, near);
+                    if (d < distance) distance = d;
+                }
+                if (within) distance = dot(corner[0], n) * dot(corner[0], n) / area;
+                if (distance < least) { least = distance; best = face; }
+            }
+        } else {
+            const BVHPackedNodeHalf al = bvh_load_node(mesh.bvh.node_lowers, low.i);
+            const BVHPackedNodeHalf ah = bvh_load_node(mesh.bvh.node_uppers, low.i);
+            const BVHPackedNodeHalf bl = bvh_load_node(mesh.bvh.node_lowers, high.i);
+            const BVHPackedNodeHalf bh = bvh_load_node(mesh.bvh.node_uppers, high.i);
+            const float a = distance_to_aabb_sq(p, vec3(al.x, al.y, al.z), vec3(ah.x, ah.y, ah.z));
+            const float b = distance_to_aabb_sq(p, vec3(bl.x, bl.y, bl.z), vec3(bh.x, bh.y, bh.z));
+            const int nearer = a < b ? low.i : high.i, farther = a < b ? high.i : low.i;
+            if ((a < b ? b : a) <= least * 1.000001) stack[count++] = farther;
+            if ((a < b ? a : b) <= least * 1.000001) stack[count++] = nearer;
+        }
+    }
+    return best;
+"""
+
+
+@wp.func_native(_NEAREST)
+def nearest_face(id: wp.uint64, p: wp.vec3, limit: float) -> int:
+    """Triangle of a mesh nearest to a point, measured in double precision; -1 where none is within the limit."""
+    ...
+
+
+@wp.func_native("return wp::mesh_query_winding_number(id, p, 2.0f);")
+def winding_number(id: wp.uint64, p: wp.vec3) -> float:
+    """Generalized winding number of a mesh around a point."""
+    ...
+
+
+@wp.kernel(enable_backward=False, module="sampler_surface")
+def find_closest(
+    mesh: wp.uint64, points: wp.array(dtype=wp.vec3), limit: wp.array(dtype=float), first: int, face: wp.array(dtype=int)
+):
+    """Triangle nearest to each point, -1 where none is within its limit."""
+    i = first + wp.tid()
+    face[i] = nearest_face(mesh, points[i], limit[i])
+
+
+@wp.kernel(enable_backward=False, module="sampler_surface")
+def find_winding(mesh: wp.uint64, points: wp.array(dtype=wp.vec3), first: int, number: wp.array(dtype=float)):
+    """Generalized winding number of each point (Jacobson et al. 2013; far triangles by Barill et al. 2018)."""
+    i = first + wp.tid()
+    number[i] = winding_number(mesh, points[i])
+
+
+@wp.kernel(enable_backward=False, module="sampler_surface")
+def cast_ray(
+    mesh: wp.uint64,
+    points: wp.array(dtype=wp.vec3),
+    direction: wp.array(dtype=wp.vec3),
+    first: int,
+    face: wp.array(dtype=int),
+    length: wp.array(dtype=float),
+):
+    """First triangle met by each ray and the way to it; -1 for none."""
+    i = first + wp.tid()
+    hit = wp.mesh_query_ray(mesh, points[i], direction[i], 4.0)
+    face[i] = wp.where(hit.result, hit.face, -1)
+    length[i] = hit.t
+
+
+class Surface:
+    """Triangles that can be asked.
+
+    Queries run in single precision on a copy of unit diagonal at the origin, wherever and however large the mesh is; closest
+    points are then computed again in double precision on the triangle that was found.
+
+    Args:
+        triangles: corners, shape (n, 3, 3) [m].
+        device: Warp device.
+
+    Attributes:
+        triangles: as given.
+        normals: of the triangles, zero where they have no area, shape (n, 3).
+    """
+
+    def __init__(self, triangles: np.ndarray, device: str = "cpu"):
+        self.device = device
+        self.triangles = np.asarray(triangles, float)
+        low, high = self.triangles.min(axis=(0, 1)), self.triangles.max(axis=(0, 1))
+        self.centre, self.unit = 0.5 * (low + high), float(np.linalg.norm(high - low))
+        cross = np.cross(self.triangles[:, 1] - self.triangles[:, 0], self.triangles[:, 2] - self.triangles[:, 0])
+        length = np.linalg.norm(cross, axis=1, keepdims=True)
+        self.areas = 0.5 * length[:, 0]
+        self.normals = np.divide(cross, length, out=np.zeros_like(cross), where=length > 0.0)
+        self.mesh = wp.Mesh(
+            points=self.shift(self.triangles.reshape(-1, 3)),
+            indices=wp.array(np.arange(3 * len(self.triangles), dtype=np.int32), dtype=int, device=device),
+            support_winding_number=True,
+        )
+
+    @staticmethod
+    def areas_of(triangles: np.ndarray) -> np.ndarray:
+        """Areas of triangles, shape (n, 3, 3) [m]."""
+        return 0.5 * np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+
+    def shift(self, points: np.ndarray) -> wp.array:
+        """Points in the frame and unit of the queries."""
+        moved = ((np.asarray(points, float) - self.centre) / self.unit).astype(np.float32)
+        return wp.array(moved, dtype=wp.vec3, device=self.device)
+
+    def closest(self, points: np.ndarray, limit: np.ndarray | float | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Closest points of the triangles.
+
+        Args:
+            points: shape (n, 3) [m].
+            limit: farthest to look [m]; everywhere if None.
+
+        Returns:
+            Closest points, shape (n, 3) [m]; triangles they lie on, shape (n,), -1 and the point itself where there is none.
+        """
+        points = np.asarray(points, float).reshape(-1, 3)
+        if limit is None:
+            limit = np.linalg.norm(points - self.centre, axis=1) + self.unit
+        limit = np.broadcast_to(np.asarray(limit, float) / self.unit, len(points)).astype(np.float32)
+        face = wp.empty(len(points), dtype=int, device=self.device)
+        limit = wp.array(limit, dtype=float, device=self.device)
+        self._launch(find_closest, [self.shift(points), limit], [face])
+        face = face.numpy()
+        nearest = points.copy()
+        found = face >= 0
+        nearest[found] = closest_on_triangles(points[found], self.triangles[face[found]])
+        return nearest, face
+
+    def winding(self, points: np.ndarray) -> np.ndarray:
+        """Generalized winding number of points, shape (n, 3) [m]: 1 inside, 0 outside of a closed surface."""
+        number = wp.empty(len(points), dtype=float, device=self.device)
+        self._launch(find_winding, [self.shift(points)], [number])
+        return number.numpy()
+
+    def cast(self, points: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """First triangles met by rays of unit direction, shape (n,), -1 for none, and the ways to them, shape (n,) [m]."""
+        face = wp.empty(len(points), dtype=int, device=self.device)
+        length = wp.empty(len(points), dtype=float, device=self.device)
+        direction = wp.array(np.asarray(direction, np.float32), dtype=wp.vec3, device=self.device)
+        self._launch(cast_ray, [self.shift(points), direction], [face, length])
+        return face.numpy(), length.numpy() * self.unit
+
+    def _launch(self, kernel, inputs: list, outputs: list) -> None:
+        launch_shares(kernel, len(outputs[0]), [self.mesh.id, *inputs], outputs, self.device)
+
+
+def launch_shares(kernel, number: int, inputs: list, outputs: list, device: str) -> None:
+    """Launch a kernel whose argument before the outputs is its first item; on a CPU each core takes a share of the items."""
+    cores = len(os.sched_getaffinity(0)) if str(device) == "cpu" and number >= _TOGETHER else 1
+    cuts = np.linspace(0, number, 4 * cores + 1 if cores > 1 else 2).astype(int)
+
+    def run(first, last):
+        wp.launch(kernel, dim=int(last - first), inputs=[*inputs, int(first), *outputs], device=device)
+
+    wp.load_module(kernel.module, device)
+    if cores == 1:
+        run(0, number)
+        return
+    list(_pool(cores).map(run, cuts[:-1], cuts[1:]))
+
+
+@cache
+def _pool(cores: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(cores, thread_name_prefix="sampler")
+
+
+def closest_on_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Closest point of one triangle to one point each, in double precision, also on triangles without area.
+
+    Args:
+        points: shape (n, 3) [m].
+        triangles: shape (n, 3, 3) [m].
+    """
+    best = None
+    for k in range(3):  # the three edges
+        a, along = triangles[:, k], triangles[:, (k + 1) % 3] - triangles[:, k]
+        square = np.einsum("ij,ij->i", along, along)
+        share = np.einsum("ij,ij->i", points - a, along) / np.where(square > 0.0, square, 1.0)
+        near = a + np.clip(share, 0.0, 1.0)[:, None] * along
+        far = np.einsum("ij,ij->i", points - near, points - near)
+        if best is None:
+            best, least = near, far
+        else:
+            better = far < least
+            best, least = np.where(better[:, None], near, best), np.where(better, far, least)
+    a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    normal = np.cross(u, v)
+    square = np.einsum("ij,ij->i", normal, normal)
+    safe = np.where(square > 0.0, square, 1.0)
+    out = points - a
+    p = np.einsum("ij,ij->i", np.cross(out, v), normal) / safe
+    q = np.einsum("ij,ij->i", np.cross(u, out), normal) / safe
+    inside = (square > 0.0) & (p >= 0.0) & (q >= 0.0) & (p + q <= 1.0)
+    foot = points - (np.einsum("ij,ij->i", out, normal) / safe)[:, None] * normal
+    return np.where(inside[:, None], foot, best)

@@ -1,0 +1,225 @@
+"""Particle bodies: even, covering every skin, tight to grains, with the right mass."""
+
+import numpy as np
+import pytest
+import trimesh
+from shapes import SOLIDS, THIN, robot_mesh, wavy_ball, wedge
+
+from sampler import MeshError, SignedDistance, make_field, read_mesh, repair_mesh, sample_body
+from sampler.mass import integrate
+
+
+def distances(a, b):
+    """From each point of a to the nearest of b, and which that is."""
+    found = [np.linalg.norm(part[:, None] - b[None], axis=2) for part in np.array_split(a, max(1, len(a) * len(b) // 3_000_000))]
+    return np.concatenate([f.min(axis=1) for f in found])
+
+
+def neighbours(points):
+    far = np.linalg.norm(points[:, None] - points[None], axis=2)
+    np.fill_diagonal(far, np.inf)
+    return far.min(axis=1)
+
+
+def surface_samples(mesh, number=20000):
+    points, face = trimesh.sample.sample_surface(mesh, number, seed=7)
+    return points, mesh.face_normals[face]
+
+
+def skin_gap(mesh, body):
+    """Farthest place from the particles whose normals are within 134 degrees of its own, so not on the other skin of a wall."""
+    points, normals = surface_samples(mesh)
+    gap = 0.0
+    for block in np.array_split(np.arange(len(points)), 20):
+        far = np.linalg.norm(points[block, None] - body.points[None], axis=2)
+        far[normals[block] @ body.normals.T < -0.7] = np.inf
+        gap = max(gap, far.min(axis=1).max())
+    return gap
+
+
+@pytest.mark.parametrize("count", [300, 1000])
+@pytest.mark.parametrize("shape", ["ball", "box", "torus"])
+def test_solids_are_covered_evenly(shape, count):
+    mesh = {
+        "ball": wavy_ball(),
+        "box": trimesh.creation.box((0.1, 0.07, 0.05)),
+        "torus": trimesh.creation.torus(0.05, 0.02, 64, 32),
+    }[shape]
+    body = sample_body(mesh, radius=0.002, count=count)
+    h = np.sqrt(2.0 * mesh.area / (np.sqrt(3.0) * count))
+    near = neighbours(body.points) / h
+    assert abs(len(body) - count) <= 0.01 * count
+    assert near.std() / near.mean() <= (0.065 if shape == "box" else 0.05)
+    assert near.min() >= (0.6 if shape == "box" else 0.75)
+    assert near.max() <= 1.10
+    assert distances(surface_samples(mesh)[0], body.points).max() <= 0.80 * h
+    assert body.evenness.coverage * body.spacing == pytest.approx(
+        distances(surface_samples(mesh)[0], body.points).max(), rel=0.08
+    )
+    assert np.abs(SignedDistance(mesh).query(body.points)[0]).max() < 1e-3 * body.radius
+
+
+@pytest.mark.parametrize("share", [0.003, 0.02])
+def test_both_skins_of_a_plate_are_covered(share):
+    plate = trimesh.creation.box((0.1, 0.06, 0.1 * share))
+    body = sample_body(plate, radius=0.002, count=800)
+    near = neighbours(body.points) / body.spacing
+    assert skin_gap(plate, body) <= body.spacing
+    assert near.min() >= 0.35
+    assert near.max() <= 1.10
+
+
+def test_acute_edges_are_covered():
+    mesh = wedge()
+    body = sample_body(mesh, radius=0.002, count=800)
+    assert distances(surface_samples(mesh)[0], body.points).max() <= 0.85 * body.spacing
+    assert body.evenness.skin_coverage <= 1.0
+    assert neighbours(body.points).min() >= 0.35 * body.spacing
+
+
+@pytest.mark.parametrize("name", [*THIN, *SOLIDS, "viper_blade.obj"])
+def test_robot_meshes_are_covered(name):
+    mesh = read_mesh(robot_mesh(name), 0.001 if "_mm" in name else 1.0)
+    body = sample_body(mesh, radius=0.01 * np.linalg.norm(mesh.extents), count=1000)
+    near = neighbours(body.points) / body.spacing
+    assert abs(len(body) - 1000) <= 10
+    assert near.min() >= 0.35
+    assert near.max() <= 1.10
+    assert distances(surface_samples(mesh)[0], body.points).max() <= 0.80 * body.spacing
+    assert body.evenness.skin_coverage <= 1.0
+
+
+def test_buried_walls_get_no_particles():
+    ball, box = trimesh.creation.icosphere(4, radius=0.05), trimesh.creation.box((0.16, 0.03, 0.03))
+    body = sample_body(trimesh.util.concatenate([ball, box]), radius=0.002, count=2000)
+    within_ball = SignedDistance(ball).query(body.points)[0] < -1e-5
+    within_box = SignedDistance(box).query(body.points)[0] < -1e-5
+    assert np.sum(within_ball | within_box) <= 0.001 * len(body)
+    assert body.volume == pytest.approx(union_volume(ball, box), rel=2e-3)
+
+
+def union_volume(ball, box):
+    """By counting a fine grid of points in the box that are outside the ball."""
+    axes = [np.linspace(-s, s, n, endpoint=False) + s / n for s, n in zip((0.08, 0.015, 0.015), (640, 120, 120), strict=True)]
+    radius = np.linalg.norm(np.stack(np.meshgrid(*axes, indexing="ij")), axis=0)
+    return ball.volume + box.volume * np.mean(radius > 0.0499)
+
+
+@pytest.mark.parametrize("grain", [0.004, 0.001, 0.0004])
+def test_no_grain_can_pass(grain):
+    mesh = wavy_ball()
+    body = sample_body(mesh, radius=0.003, grain=grain)
+    assert distances(surface_samples(mesh)[0], body.points).max() < body.radius + grain
+    assert body.smallest_grain < grain
+
+
+def test_a_leaky_body_is_refused():
+    with pytest.raises(MeshError, match="could pass"):
+        sample_body(wavy_ball(), radius=0.001, count=300, grain=0.001)
+
+
+@pytest.mark.parametrize("grain", [0.001, 0.004, 0.02])
+def test_contact_normals_lean_as_much_as_is_told(grain):
+    box = trimesh.creation.box((0.1, 0.1, 0.02))
+    body = sample_body(box, radius=0.003)
+    top = body.points[np.isclose(body.points[:, 2], 0.01)]
+    places = np.random.default_rng(0).uniform(-0.03, 0.03, (20000, 2))
+    nearest = distances(np.column_stack([places, np.full(len(places), 0.01)]), top)
+    lean = np.arcsin(nearest / (body.radius + grain))  # of a grain let down there until it touches
+    assert lean.max() <= body.roughness(grain)
+    assert lean.max() >= 0.85 * body.roughness(grain)
+
+
+def test_inset_keeps_the_outer_size():
+    box = trimesh.creation.box((0.1, 0.07, 0.05))
+    body = sample_body(box, radius=0.004, inset=True)
+    out = np.abs(body.points) + body.radius - np.array([0.05, 0.035, 0.025])
+    assert np.abs(out.max(axis=1)).max() < 0.02 * body.radius
+    inner = trimesh.creation.box(np.array([0.1, 0.07, 0.05]) - 2.0 * body.radius)
+    assert distances(surface_samples(inner)[0], body.points).max() < 1.0 * body.spacing
+
+
+def test_thick_sheets_get_two_skins_and_thin_ones_one_layer():
+    plate = trimesh.Trimesh([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]], [[0, 1, 2], [0, 2, 3]])
+    thick = sample_body(plate, radius=0.002, thickness=0.01)
+    assert np.abs(thick.points[:, 2]).max() == pytest.approx(0.005, abs=1e-6)
+    assert thick.volume == pytest.approx(0.1 * 0.1 * 0.01, rel=1e-9)
+    thin = sample_body(plate, radius=0.002, thickness=0.001)
+    assert np.abs(thin.points[:, 2]).max() == 0.0
+    assert thin.volume == pytest.approx(0.1 * 0.1 * 0.001, rel=1e-9)
+    assert thin.inertia[2, 2] == pytest.approx(thin.volume * 0.1**2 / 6.0, rel=1e-9)
+
+
+def test_a_branching_sheet_becomes_one_closed_solid():
+    corners, faces = [], []
+    for angle in (0.0, 2.1, 4.2):
+        out = np.array([0.1 * np.cos(angle), 0.1 * np.sin(angle), 0.0])
+        faces += [[len(corners), len(corners) + 1, len(corners) + 2], [len(corners), len(corners) + 2, len(corners) + 3]]
+        corners += [np.zeros(3), out, out + [0, 0, 0.1], np.array([0, 0, 0.1])]
+    mesh = trimesh.Trimesh(corners, faces, process=False).subdivide()
+    body = sample_body(mesh, radius=0.002, thickness=0.002, sheets="always")
+    solid = trimesh.Trimesh(body.triangles.reshape(-1, 3), np.arange(3 * len(body.triangles)).reshape(-1, 3))
+    assert solid.is_watertight
+    assert body.volume == pytest.approx(3 * 0.01 * 0.002, rel=0.02)
+
+
+def test_mass_is_exact_on_closed_meshes():
+    random = np.random.default_rng(1)
+    box = trimesh.creation.box((0.2, 0.1, 0.06))
+    turn = trimesh.transformations.random_rotation_matrix(random.uniform(size=3))
+    turn[:3, 3] = [3.0, -2.0, 1.0]
+    box.apply_transform(turn)
+    mass = sample_body(box, radius=0.01).mass_properties(density=1000.0)
+    assert mass.mass == pytest.approx(1.2, rel=1e-10)
+    assert mass.centre == pytest.approx([3.0, -2.0, 1.0], rel=1e-10)
+    expected = sorted(0.1 * (a * a + b * b) for a, b in ((0.1, 0.06), (0.2, 0.06), (0.2, 0.1)))
+    assert mass.principal == pytest.approx(expected, rel=1e-10)
+    assert mass.axes @ np.diag(mass.principal) @ mass.axes.T == pytest.approx(mass.inertia, rel=1e-9, abs=1e-12)
+    assert np.linalg.det(mass.axes) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("given", [{}, {"density": 1.0, "mass": 1.0}, {"density": -1.0}, {"mass": float("nan")}])
+def test_mass_needs_one_positive_number(given):
+    with pytest.raises(MeshError, match="either a density"):
+        sample_body(trimesh.creation.box((0.2, 0.1, 0.06)), radius=0.02).mass_properties(**given)
+
+
+def test_thinnest_wall():
+    tray = trimesh.creation.box((0.1, 0.1, 0.0031))
+    assert sample_body(tray, radius=0.005).thinnest_wall == pytest.approx(0.0031, rel=1e-3)
+
+
+def test_the_field_follows_the_distance():
+    mesh = wavy_ball()
+    distance = SignedDistance(mesh)
+    field = make_field(distance, band=0.01, cell=0.002)
+    points = np.random.default_rng(0).uniform(-0.06, 0.06, (3000, 3))
+    exact = distance.query(points)[0]
+    value, gradient = field.sample(points)
+    near = np.abs(exact) < 0.009
+    assert np.abs(value - exact)[near].max() < 0.25 * field.cell
+    assert np.array_equal(np.sign(value[~near]), np.sign(exact[~near]))
+    step = 1e-6 * np.eye(3)
+    slope = np.stack([(field.sample(points[near] + s)[0] - field.sample(points[near] - s)[0]) / 2e-6 for s in step], axis=1)
+    assert np.median(np.abs(slope - gradient[near])) < 1e-6
+
+
+def test_the_field_says_where_memory_is_too_small_for_thin_walls():
+    plate = SignedDistance(trimesh.creation.box((0.1, 0.1, 0.001)))
+    fine = make_field(plate, band=0.002)
+    assert fine.resolves_walls
+    assert fine.sample([[0.0123, 0.0234, 0.0]])[0] == pytest.approx([-0.0005], rel=1e-3)
+    coarse = make_field(plate, band=0.002, memory=1 << 21)
+    assert not coarse.resolves_walls
+    assert coarse.memory <= 1 << 21
+
+
+def test_integrals_of_a_tetrahedron():
+    # A right-angled tetrahedron with legs a: V = a^3/6, centre a/4, second moments a^5/60 and products a^5/120 about the corner.
+    mesh = trimesh.Trimesh(np.vstack([np.zeros(3), np.eye(3)]) * 0.3, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    volume, centre, inertia = integrate(repair_mesh(mesh).triangles)
+    a = 0.3
+    second = a**5 / 120.0 * (np.ones((3, 3)) + np.eye(3)) - volume * np.outer(centre, centre)
+    assert volume == pytest.approx(a**3 / 6.0, rel=1e-12)
+    assert centre == pytest.approx(3 * [a / 4.0], rel=1e-12)
+    assert inertia == pytest.approx(np.trace(second) * np.eye(3) - second, rel=1e-9)

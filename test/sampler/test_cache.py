@@ -1,0 +1,122 @@
+"""Bodies that were sampled before, and the command line."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from sampler import load_body, sample_file
+from sampler.cache import cache_folder
+
+BUCKET = Path(__file__).parents[2] / "config" / "meshes" / "bucket.stl"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("SAMPLER_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def box(tmp_path):
+    trimesh.creation.box((0.1, 0.06, 0.02)).export(tmp_path / "box.stl")
+    return tmp_path / "box.stl"
+
+
+def test_second_load_is_the_first(box, folder):
+    first = sample_file(box, 0.004, grain=0.003)
+    assert len(list(folder.iterdir())) == 1
+    begin = time.perf_counter()
+    second = sample_file(box, 0.004, grain=0.003)
+    assert time.perf_counter() - begin < 0.1
+    for name in ("points", "normals", "triangles", "inertia"):
+        assert np.array_equal(getattr(first, name), getattr(second, name))
+    assert (first.evenness, first.steps, first.warnings) == (second.evenness, second.steps, second.warnings)
+
+
+def test_other_content_or_options_are_sampled_anew(box, folder):
+    sample_file(box, 0.004)
+    sample_file(box, 0.005)
+    sample_file(box, 0.004, scale=2.0)
+    sample_file(box, 0.004, seed=1)
+    trimesh.creation.box((0.1, 0.06, 0.03)).export(box)
+    sample_file(box, 0.004)
+    assert len(list(folder.iterdir())) == 5
+
+
+def test_damaged_cache_files_are_replaced(box, folder):
+    first = sample_file(box, 0.004)
+    (kept,) = folder.iterdir()
+    whole = kept.read_bytes()
+    for broken in (b"", whole[: len(whole) // 2], b"\xff" + whole[1:], whole[:-40]):
+        kept.write_bytes(broken)
+        assert np.array_equal(sample_file(box, 0.004).points, first.points)
+        assert load_body(kept).radius == 0.004
+
+
+def test_cache_survives_a_killed_writer(box, folder):
+    code = (
+        "import numpy as np, os, signal, sys; from sampler import sample_file\n"
+        "save = np.savez\n"
+        "def killed(file, **arrays):\n"
+        "    file.write(b'half of it'); file.flush(); os.kill(os.getpid(), signal.SIGKILL)\n"
+        "np.savez = killed\n"
+        f"sample_file({str(box)!r}, 0.004)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=False, cwd=Path(__file__).parents[2], capture_output=True)
+    assert done.returncode == -signal.SIGKILL
+    (left,) = folder.iterdir()
+    body = sample_file(box, 0.004)
+    assert len(body) > 100
+    assert len(list(folder.iterdir())) == 2
+    os.utime(left, (0, 0))
+    sample_file(box, 0.005)
+    assert not left.exists()
+
+
+def test_a_folder_that_cannot_be_written_does_no_harm(box, folder):
+    folder.write_text("a file where the folder should be")
+    assert cache_folder() == folder
+    assert len(sample_file(box, 0.004)) > 100
+
+
+def run(*arguments):
+    command = [sys.executable, "-W", "ignore", "-m", "sampler", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=Path(__file__).parents[2])
+
+
+def test_command_line(tmp_path):
+    done = run(
+        BUCKET, "--radius", 0.006, "--count", 500, "--density", 7800, "-o", tmp_path / "b.npz", "--rrd", tmp_path / "b.rrd"
+    )
+    assert done.returncode == 0, done.stderr
+    rows = dict(line.split("  ", 1) for line in done.stdout.splitlines() if "  " in line)
+    for name in ("mended", "particles", "spacing h", "coverage", "thinnest wall", "mass", "time"):
+        assert name in rows
+    body = load_body(tmp_path / "b.npz")
+    assert abs(len(body) - 500) <= 5
+    assert float(rows["mass"].split()[0]) == pytest.approx(7800 * body.volume, rel=1e-5)
+    assert (tmp_path / "b.rrd").stat().st_size > 50_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["missing.stl", "--radius", 0.01], "there is no file"),
+        ([BUCKET, "--radius", -1], "particle radius must be positive"),
+        ([BUCKET, "--radius", 0.01, "--count", 10, "--spacing", 0.1], "either the spacing or the count"),
+        ([BUCKET, "--radius", 0.002, "--count", 300, "--grain", 0.001], "could pass"),
+    ],
+)
+def test_command_line_refuses_with_one_line(arguments, reason):
+    done = run(*arguments)
+    assert done.returncode == 1
+    (line,) = [line for line in done.stderr.splitlines() if not line.startswith("Warp")]
+    assert line.startswith("error: ")
+    assert reason in line

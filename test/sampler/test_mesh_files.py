@@ -1,0 +1,111 @@
+"""Files: units, strips, and every kind of damage that readers pass over."""
+
+import struct
+
+import numpy as np
+import pytest
+import trimesh
+from shapes import robot_mesh
+
+from sampler import MeshError, read_mesh, repair_mesh, sample_body
+
+
+@pytest.fixture
+def box():
+    return trimesh.creation.box((0.1, 0.06, 0.02))
+
+
+def test_unit_and_node_transforms_of_dae_are_applied(tmp_path, box):
+    path = tmp_path / "inches.dae"
+    text = box.export(file_type="dae").decode()
+    assert "<node" in text
+    text = text.replace('<unit name="meter" meter="1"', '<unit name="inch" meter="0.0254"')
+    if "0.0254" not in text:
+        text = text.replace("</asset>", '<unit name="inch" meter="0.0254"/></asset>')
+    head, _, tail = text.partition("<node")
+    opening, _, rest = tail.partition(">")
+    path.write_text(f"{head}<node{opening}><matrix>0 -2 0 3 2 0 0 0 0 0 2 0 0 0 0 1</matrix>{rest}")
+    mesh = read_mesh(path)
+    assert mesh.extents == pytest.approx(np.array([0.12, 0.2, 0.04]) * 0.0254, rel=1e-6)
+    assert mesh.bounds.mean(axis=0) == pytest.approx([3 * 0.0254, 0, 0], abs=1e-7)
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_triangle_strips_are_read(tmp_path, kind):
+    # Two strips: a band of four triangles, and one triangle; every second triangle of a strip is turned.
+    points = [[0, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [2, 0, 0], [2, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]]
+    strip = [1, 0, 3, 2, 5, 4, -1, 6, 7, 8]
+    header = f"ply\nformat {kind} 1.0\nelement vertex 9\nproperty float x\nproperty float y\nproperty float z\n"
+    header += "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+    order = ">" if "big" in kind else "<"
+    if kind == "ascii":
+        body = "\n".join(" ".join(map(str, p)) for p in points) + f"\n{len(strip)} " + " ".join(map(str, strip)) + "\n"
+        body = body.encode()
+    else:
+        body = np.array(points, order + "f4").tobytes() + np.array([len(strip), *strip], order + "i4").tobytes()
+    (tmp_path / "strips.ply").write_bytes(header.encode() + body)
+    mesh = read_mesh(tmp_path / "strips.ply", scale=0.5)
+    assert len(mesh.faces) == 5
+    assert mesh.area == pytest.approx(0.25 * (2.0 + 0.5))
+    assert mesh.face_normals == pytest.approx(np.tile([0.0, 0.0, 1.0], (5, 1)))
+
+
+@pytest.mark.parametrize("kind", ["stl", "stl_ascii", "ply", "ply_ascii", "off", "glb", "obj"])
+@pytest.mark.parametrize("share", [0.35, 0.6, 0.9])
+def test_files_cut_off_are_refused(tmp_path, kind, share):
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    options = {"encoding": "ascii"} if kind == "ply_ascii" else {}
+    data = ball.export(file_type=kind.replace("ply_ascii", "ply"), **options)
+    data = data.encode() if isinstance(data, str) else data
+    path = tmp_path / f"cut.{kind.split('_')[0]}"
+    cut = data[: int(share * len(data))]
+    path.write_bytes(cut[: cut.rindex(b" ")] if kind == "obj" else cut)  # an OBJ is seen to be cut only within a line
+    with pytest.raises(MeshError, match=r"mesh cut\."):
+        sample_body(read_mesh(path), radius=0.1)
+
+
+def test_stl_with_bytes_to_spare_is_read(tmp_path, box):
+    path = tmp_path / "spare.stl"
+    path.write_bytes(box.export(file_type="stl") + b"made by a careless program")
+    assert read_mesh(path).volume == pytest.approx(box.volume, rel=1e-6)
+
+
+def stl_of(triangles):
+    rows = b"".join(struct.pack("<12fH", 0, 0, 0, *np.ravel(t), 0) for t in triangles)
+    return b"\0" * 80 + struct.pack("<I", len(triangles)) + rows
+
+
+def test_vertices_that_are_not_finite_are_refused(tmp_path, box):
+    triangles = np.array(box.triangles)
+    triangles[3, 1, 2] = np.nan
+    (tmp_path / "nan.stl").write_bytes(stl_of(triangles))
+    with pytest.raises(MeshError, match=r"nan\.stl: has vertices that are not finite"):
+        read_mesh(tmp_path / "nan.stl")
+
+
+def test_faces_of_missing_vertices_are_refused(tmp_path):
+    (tmp_path / "short.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 2 3 4\n")
+    with pytest.raises(MeshError, match="'f 2 3 4' refers to a vertex that is not among the 3"):
+        read_mesh(tmp_path / "short.obj")
+
+
+def test_triangle_soup_has_no_inside():
+    random = np.random.default_rng(0)
+    corners = random.uniform(size=(60, 1, 3)) + 0.2 * random.normal(size=(60, 3, 3))
+    soup = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(180).reshape(-1, 3), process=False)
+    with pytest.raises(MeshError, match="60 of its 60 triangles are loose and enclose nothing"):
+        repair_mesh(soup)
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("bad_empty_bin.stl", "has no triangles"),
+        ("bad_not_enough_indices.obj", "'f 1// 2//' has too few corners"),
+        ("bad_truncated.stl", "promises 194 triangles and holds 115"),
+        ("bad_triangle_soup.stl", "loose and enclose nothing"),
+    ],
+)
+def test_bad_robot_meshes_are_refused(name, reason):
+    with pytest.raises(MeshError, match=reason):
+        sample_body(read_mesh(robot_mesh(name)), radius=0.01)

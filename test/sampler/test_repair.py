@@ -1,0 +1,119 @@
+"""Damaged meshes against the sound ones they were made from."""
+
+import numpy as np
+import pytest
+import trimesh
+from shapes import THIN, damaged, far_from_surface, grid_around, robot_mesh, solid_angle_inside, wavy_ball
+
+from sampler import SignedDistance, read_mesh, repair_mesh
+from sampler.mass import integrate
+
+HARMLESS = ("flipped", "doubled", "doubled with backs", "cracked", "missing")
+
+
+def signs(mesh, sound, seed=1):
+    """Share of wrong signs on a grid and near the surface, by solid angles of the sound mesh."""
+    random = np.random.default_rng(seed)
+    near, _ = trimesh.sample.sample_surface(sound, 3000, seed=seed)
+    near = near + random.normal(size=near.shape) * 5e-3 * np.linalg.norm(sound.extents)
+    distance, wrong = SignedDistance(mesh), []
+    for places in (grid_around(sound, 16), near):
+        points = places[far_from_surface(SignedDistance(sound), places)]
+        inside = distance.query(points)[0] < 0.0
+        wrong.append(np.mean(inside != solid_angle_inside(np.asarray(sound.triangles), points)))
+    return wrong
+
+
+@pytest.mark.parametrize("how", HARMLESS)
+def test_signs_survive_damage(how):
+    ball = wavy_ball(3)
+    grid, near = signs(damaged(ball, how), ball)
+    assert grid <= 1e-4
+    assert near <= 1e-3
+
+
+def test_a_hole_costs_little_and_is_told():
+    ball = wavy_ball(3)
+    broken = damaged(ball, "hole")
+    grid, near = signs(broken, ball)
+    assert 0.0 < grid <= 5e-3
+    assert near <= 0.03
+    assert any("holes were closed" in warning for warning in repair_mesh(broken).report.warnings)
+
+
+@pytest.mark.parametrize(("how", "volume", "centre", "inertia"), [("missing", 0.015, 0.003, 0.01), ("hole", 0.06, 0.015, 0.08)])
+@pytest.mark.parametrize("seed", range(3))
+def test_mass_of_broken_meshes(how, volume, centre, inertia, seed):
+    ball = wavy_ball()
+    exact = integrate(np.asarray(ball.triangles))
+    found = integrate(repair_mesh(damaged(ball, how, seed)).triangles)
+    assert found[0] == pytest.approx(exact[0], rel=volume)
+    assert np.linalg.norm(found[1] - exact[1]) < centre * np.linalg.norm(ball.extents)
+    assert np.abs(found[2] - exact[2]).max() < inertia * np.abs(exact[2]).max()
+
+
+def test_every_step_is_counted():
+    box = trimesh.creation.box((1.0, 1.0, 1.0))
+    faces = np.concatenate([box.faces, box.faces[:2], box.faces[2:3, ::-1], [[0, 0, 1]]])
+    faces[4] = faces[4][::-1]
+    steps = repair_mesh(trimesh.Trimesh(box.vertices, faces, process=False)).report.steps
+    assert steps["duplicate faces dropped"] == 3
+    assert steps["degenerate faces dropped"] == 1
+    assert steps["faces turned"] == 1
+    assert steps["vertices merged"] == 0
+
+
+def test_inside_out_solids_are_turned_but_cavities_stay():
+    outer, inner = trimesh.creation.icosphere(3, radius=1.0), trimesh.creation.icosphere(3, radius=0.5)
+    inner.invert()
+    hollow = trimesh.util.concatenate([outer, inner])
+    for mesh in (hollow, trimesh.Trimesh(hollow.vertices, hollow.faces[:, ::-1], process=False)):
+        assert SignedDistance(mesh).query([[0, 0, 0], [0, 0, 0.75], [0, 0, 1.5]])[0] == pytest.approx([0.5, -0.25, 0.5], abs=0.01)
+
+
+def test_a_wall_between_touching_solids_is_no_surface():
+    left = trimesh.creation.box((1, 1, 1))
+    right = trimesh.Trimesh(left.vertices * [-1, 1, 1] + [1, 0, 0], left.faces[:, ::-1])
+    both = trimesh.util.concatenate([left, right])
+    assert repair_mesh(both).report.steps["duplicate faces dropped"] == 4
+    assert SignedDistance(both).query([[0.5, 0, 0]])[0] == pytest.approx([-0.5])
+
+
+@pytest.mark.parametrize("size", [1e-4, 1.0, 1e4])
+def test_overlapping_parts_have_one_inside(size):
+    balls = [trimesh.creation.icosphere(3, radius=1.0) for _ in range(3)]
+    for k, ball in enumerate(balls):
+        ball.apply_translation([0.8 * k, 0.3 * k * k, 0.0])
+        ball.apply_scale(size)
+    union = trimesh.util.concatenate(balls)
+    distance, points = SignedDistance(union), np.random.default_rng(0).uniform(-1.2, 3.2, (4000, 3)) * size
+    points = points[far_from_surface(distance, points)]
+    inside = np.any([solid_angle_inside(np.asarray(ball.triangles), points) for ball in balls], axis=0)
+    assert np.array_equal(distance.query(points)[0] < 0.0, inside)
+
+
+@pytest.mark.parametrize("name", [*THIN, "viper_blade.obj"])
+def test_signs_of_robot_meshes_just_off_the_surface(name):
+    mesh = read_mesh(robot_mesh(name))
+    distance = SignedDistance(mesh)
+    surface, face = trimesh.sample.sample_surface(trimesh.Trimesh(**flat(distance)), 1500, seed=2)
+    normal = distance.surface.normals[face]
+    step = 1.1e-5 * distance.surface.unit
+    inside = solid_angle_inside(distance.surface.triangles, np.concatenate([surface + step * normal, surface - step * normal]))
+    found = distance.query(np.concatenate([surface + step * normal, surface - step * normal]))[0] < 0.0
+    assert np.array_equal(found, inside)
+
+
+def flat(distance):
+    corners = distance.surface.triangles.reshape(-1, 3)
+    return {"vertices": corners, "faces": np.arange(len(corners)).reshape(-1, 3), "process": False}
+
+
+@pytest.mark.parametrize("how", HARMLESS)
+@pytest.mark.parametrize("name", ["excavator_bucket_mm.stl", "franka_hand_col.stl"])
+def test_damaged_robot_meshes(name, how):
+    mesh = read_mesh(robot_mesh(name))
+    mesh.merge_vertices()
+    grid, near = signs(damaged(mesh, how), mesh)
+    assert grid <= 1e-4
+    assert near <= 1e-3
