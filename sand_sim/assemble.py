@@ -1,14 +1,10 @@
 """From a checked Scene to the arrays of a solver: the only place that knows both."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
-import trimesh
 
-from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_file
-from sand_sim import rotation
 from sand_sim.body_model import BodyModel, lighten, model_body
 from sand_sim.engine.arrays import DemArrays, Setting
 from sand_sim.engine.device import open_device
@@ -23,37 +19,16 @@ from sand_sim.scene.filling import fill_grains
 from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.stable_step import DEEP
 from sand_sim.scene.time_step import TimeStep, choose_time_step, fastest_speed
-from sand_sim.scene.types import Scene, SceneError, Tool
+from sand_sim.scene.types import Scene, SceneError
 from sand_sim.scene.walls import Wall, walls_of
 from sand_sim.surfacing import kinds_of, make_plungers, make_surfaces
 from sand_sim.terrain import Ground, model_ground
+from sand_sim.tool_model import Progress, ToolModel, model_tool
 
 _SKIN = 0.25  # of the mean grain radius
 _SPHERES_PER_THREAD = 1000
 _MARGIN = 0.25  # of the scene's largest edge, free around everything in it
 _FLOOR = 0.05  # a plane whose normal points up by at least this much is a floor
-
-Progress = Callable[[str, float], None]
-
-
-@dataclass(frozen=True)
-class ToolModel:
-    """A tool with its mesh and its particles, both in the tool frame [m]."""
-
-    tool: Tool
-    mesh: trimesh.Trimesh
-    body: ParticleBody
-
-    @property
-    def extent(self) -> float:
-        """Farthest particle surface from the tool frame's origin [m]."""
-        return float(np.linalg.norm(self.body.points, axis=1).max() + self.body.radius)
-
-    def distance(self, position: np.ndarray) -> np.ndarray:
-        """Distance of world points, shape (n, 3), from the particles' hull at the initial pose, shape (n,) [m]."""
-        pose = self.tool.pose
-        local = rotation.rotate(rotation.inverse(np.asarray(pose.orientation)), position - np.asarray(pose.position))
-        return SignedDistance(self.mesh).query(local)[0] - self.body.radius
 
 
 @dataclass(frozen=True)
@@ -135,7 +110,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     Raises:
         SceneError: if a mesh, a fill or the time step cannot be used; the message names the field.
     """
-    tools = [_model_tool(tool, scene, progress) for tool in scene.tools]
+    tools = [model_tool(tool, scene, progress) for tool in scene.tools]
     grounds = [
         model_ground(one, scene.folder, lambda share, name=one.name: progress(f"sampling {name}", share))
         for one in scene.boundaries
@@ -208,27 +183,9 @@ def _open_device(scene: Scene, spheres: int):
         raise SceneError(f"solver.device: {error}") from None
 
 
-def _model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
-    try:
-        path = locate_mesh(tool.mesh, scene.folder)
-        mesh = read_mesh(path, tool.scale)
-        show = partial(progress, f"sampling {tool.name}")
-        body = sample_file(path, tool.particle_radius, tool.scale, grain=_smallest_grain(scene), progress=show)
-    except MeshError as error:
-        raise SceneError(f"tools.{tool.name}.mesh: {error}") from None
-    return ToolModel(tool, mesh, body)
-
-
 def _loose_materials(scene: Scene) -> set[str]:
     """Names of the materials of everything that moves freely."""
     return {one.material for one in (*scene.fills, *scene.bodies)}
-
-
-def _smallest_grain(scene: Scene) -> float | None:
-    """Smallest radius that the fills can draw, none of which may pass between a tool's particles [m]."""
-    sizes = [fill.size for fill in scene.fills if fill.size]
-    least = [min(size.radii) if size.radii else size.low or size.mean for size in sizes]
-    return min(least, default=None)
 
 
 def _material_order(scene: Scene) -> list[str]:

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sand_sim import rotation
-from sand_sim.assemble import Assembly, ToolModel
+from sand_sim.assemble import Assembly
 from sand_sim.border import BodyReport, GrainCloud, Health, ToolReport, WallReport
 from sand_sim.integrator import VERLET
+from sand_sim.tool_model import ToolModel
 from sand_sim.track import Track
 from sand_sim.trust import find_doubts
 

@@ -5,7 +5,7 @@ from dataclasses import astuple
 import numpy as np
 
 from sand_sim import rotation
-from sand_sim.assemble import Assembly, Progress, ToolModel, assemble
+from sand_sim.assemble import Assembly, assemble
 from sand_sim.beforehand import find_coarseness, find_fine_tools, find_overlap
 from sand_sim.border import CommandError, Health, Observation, ToolPose
 from sand_sim.engine.explicit_dem import UnstableError
@@ -22,6 +22,7 @@ from sand_sim.observing import (
     start_energy,
 )
 from sand_sim.scene.types import Scene, SceneError
+from sand_sim.tool_model import Progress, ToolModel
 from sand_sim.track import Track
 from sand_sim.trust import BLOWN_UP, GAINED, gained_share
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from sand_sim import rotation
-from sand_sim.assemble import ToolModel
 from sand_sim.border import GrainCloud, Observation
 from sand_sim.sinks.colours import colour_by_speed
 from sand_sim.sinks.run_log import RunLog
+from sand_sim.tool_model import ToolModel
 
 _VIEWS = 3
 _TILT = np.radians(14.0)  # of the view from the horizontal
