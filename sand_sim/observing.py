@@ -215,13 +215,15 @@ def momentum_residual(assembly: Assembly) -> float:
     force = 2.0 * mass[:, None] * gained / dt
     gravity = np.asarray(assembly.scene.gravity)
     outer = mass.sum() * gravity
+    size = np.abs(force).sum() + np.abs(outer).sum()
     if arrays.wall_list:
-        outer = outer + arrays.wall_list.force.numpy()[: arrays.wall_list.pairs.get()].sum(axis=0, dtype=float)
+        on_walls = arrays.wall_list.force.numpy()[: arrays.wall_list.pairs.get()].astype(float)
+        outer, size = outer + on_walls.sum(axis=0), size + np.abs(on_walls).sum()
     if arrays.tools:
-        outer = outer - arrays.tools.wrench.numpy()[:, 0].sum(axis=0)
+        on_tools = arrays.tools.wrench.numpy()[:, 0]
+        outer, size = outer - on_tools.sum(axis=0), size + np.abs(on_tools).sum()
     # Rounding of the velocities shows as a force, which matters where there are hardly any.
     rounding = assembly.recipe.precision.epsilon * np.abs(2.0 * mass[:, None] * now / dt).sum()
-    size = np.abs(force).sum() + np.abs(outer).sum()
     return float(max(np.abs(force.sum(axis=0) - outer).max() - rounding, 0.0) / size) if size > 0.0 else 0.0
 
 

@@ -101,8 +101,8 @@ def start_node(ros, tmp_path):
     """``start_node(pacing=..., ...)`` runs a node on the small scene in a thread of this process."""
     running = []
 
-    def start(solver=None, **parameters):
-        scene = write_small_scene(tmp_path, solver=solver or {})
+    def start(scene_fields=None, **parameters):
+        scene = write_small_scene(tmp_path, **(scene_fields or {}))
         overrides = [Parameter(name, value=value) for name, value in ({"scene": str(scene)} | parameters).items()]
         node = SandSimNode(parameter_overrides=overrides)
         executor = SingleThreadedExecutor()
@@ -333,11 +333,12 @@ def test_nothing_is_left_behind(start_process, tmp_path):
     assert set(os.listdir("/dev/shm")) - before == set()
 
 
-FORCED = {"time_step": 4.5e-4, "force_time_step": True}  # blows up after a while
+FORCED = {"time_step": 9e-4, "force_time_step": True}  # blows up when the grains have fallen on to the floor
+LOW_FLOOR = [{"name": "floor", "type": "plane", "material": "steel", "point": [0, 0, -0.02], "normal": [0, 0, 1]}]
 
 
 def test_a_run_that_blows_up_stops_and_comes_back(client, start_node):
-    node = start_node(solver=FORCED, pacing="lockstep")
+    node = start_node({"solver": FORCED, "boundaries": LOW_FLOOR}, pacing="lockstep")
     client.connect()
     for at in frame_times(node.simulation.world.scene):
         for command in commands_at(node.simulation.world.scene, at):
