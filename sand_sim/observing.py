@@ -239,7 +239,7 @@ def observe_health(assembly: Assembly, start: StartEnergy, beforehand: tuple[str
     work = float(arrays.tools.work.numpy().sum()) if arrays.tools else 0.0
     work += float(arrays.plungers.states.numpy()["work"].sum()) if arrays.plungers else 0.0
     kinetic = sums.translation + sums.rotation
-    dissipated = start.total + work - kinetic - sums.height - sums.elastic
+    dissipated = start.total + work - kinetic - sums.height - sums.elastic - sums.carried_off
     start.most_dissipated = max(start.most_dissipated, dissipated)
     health = Health(
         time_step=chosen.value,

@@ -90,6 +90,7 @@ class DemArrays:
         rows = [pair for row in pairs for pair in row]
         self.pairs = wp.array(rows, dtype=recipe.contact.types(precision).pair, device=device)
         self.deepest = wp.zeros(lanes, dtype=precision.real, device=device)
+        self.carried_off = wp.zeros(lanes, dtype=wp.float64, device=device)
         self.fastest = wp.zeros(lanes, dtype=precision.real, device=device)
 
         self.cells = prepare_cells(table.radius, setting.listing_gap, lattice, lanes, device)

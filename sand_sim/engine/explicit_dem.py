@@ -27,6 +27,7 @@ class Sums:
         touching: contacts under load.
         fastest: largest grain speed [m/s].
         deepest: largest overlap over the smaller radius since the start [1].
+        carried_off: kinetic and potential energy of all that has left the domain [J].
     """
 
     translation: float
@@ -36,6 +37,7 @@ class Sums:
     touching: int
     fastest: float
     deepest: float
+    carried_off: float
 
 
 class ExplicitDem:
@@ -80,6 +82,7 @@ class ExplicitDem:
         self.renew_lists()
         arrays.flags.steps_done.zero_()
         arrays.deepest.zero_()
+        arrays.carried_off.zero_()
         if arrays.tools:
             for sum_so_far in (arrays.tools.wrench, arrays.tools.impulse, arrays.tools.work):
                 sum_so_far.zero_()
@@ -131,6 +134,7 @@ class ExplicitDem:
             int(contacts[1]),
             float(arrays.fastest.numpy().max()),
             float(arrays.deepest.numpy().max()),
+            float(arrays.carried_off.numpy().sum()),
         )
 
     def take_state(self) -> dict[str, np.ndarray]:

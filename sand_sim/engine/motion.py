@@ -99,7 +99,7 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
     ``w += a dt/2``.
 
     What spheres of rigid bodies feel is put aside for ``body_motion``. Grains that leave the domain get radius zero and are
-    parked; the next search retires them.
+    parked; the next search retires them, and the energy of their motion and height is noted.
 
     Source: Swope et al. 1982, https://doi.org/10.1063/1.442716; prediction as Groot & Warren 1997,
     https://doi.org/10.1063/1.474784, with lambda = 1/2 for the half-step velocity.
@@ -152,6 +152,7 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
         parking: whole,
         half_skin: real,
         starting: wp.array(dtype=int),
+        carried_off: wp.array(dtype=wp.float64),
         grains_moved: wp.array(dtype=int),
         fault: wp.array(dtype=int),
     ):
@@ -225,6 +226,10 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
             y = here[1] + whole(jump[1])
             z = here[2] + whole(jump[2])
             if wp.abs(x) > half_extent[0] or wp.abs(y) > half_extent[1] or wp.abs(z) > half_extent[2]:
+                now = motion[i]
+                height = -wp.dot(gravity, vec3(real(here[0]), real(here[1]), real(here[2])) * quantum)
+                energy = now[3] * (real(0.5) * (now[0] * now[0] + now[1] * now[1] + now[2] * now[2]) + height)
+                wp.atomic_add(carried_off, lane, wp.float64(energy))
                 place[i] = whole4(parking, parking, parking, whole(0))
                 grains_moved[0] = 1
                 continue

@@ -212,6 +212,7 @@ def move_stage(arrays: DemArrays, recorder) -> None:
             lattice.end,
             0.5 * setting.skin / lattice.quantum,
             arrays.flags.starting,
+            arrays.carried_off,
             arrays.flags.grains_moved,
             arrays.flags.fault,
         ],
@@ -227,7 +228,7 @@ def body_stage(arrays: DemArrays, recorder) -> None:
     inputs += [grains.place, grains.motion, grains.spin, grains.origin, arrays.felt_force, arrays.felt_torque]
     inputs += [precision.vec3(*setting.gravity), setting.dt, lattice.quantum]
     inputs += [precision.whole3(*lattice.half_extent.tolist()), lattice.end, 0.5 * setting.skin / lattice.quantum]
-    inputs += [flags.starting, flags.grains_moved, flags.fault]
+    inputs += [flags.starting, arrays.carried_off, flags.grains_moved, flags.fault]
     recorder.each(body_motion.build_move_bodies(arrays.recipe), bodies.count, inputs)
 
 

@@ -14,6 +14,7 @@ def take_state(arrays: DemArrays) -> dict[str, np.ndarray]:
     for name, (array, count) in _filled_arrays(arrays).items():
         state[name] = array.numpy()[: count.get()].copy()
     state["deepest"] = arrays.deepest.numpy().max(keepdims=True)
+    state["carried_off"] = arrays.carried_off.numpy().sum(keepdims=True)
     return state
 
 
@@ -42,8 +43,10 @@ def put_state(arrays: DemArrays, state: dict[str, np.ndarray]) -> bool:
     for name, (array, _) in _filled_arrays(arrays).items():
         if len(state[name]):
             wp.copy(array, wp.array(state[name], dtype=array.dtype, device=arrays.device), count=len(state[name]))
-    arrays.deepest.zero_()
-    wp.copy(arrays.deepest, wp.array(state["deepest"], dtype=arrays.deepest.dtype, device=arrays.device), count=1)
+    for name in ("deepest", "carried_off"):
+        lanes = getattr(arrays, name)
+        lanes.zero_()
+        wp.copy(lanes, wp.array(state[name], dtype=lanes.dtype, device=arrays.device), count=1)
     return grown
 
 

@@ -236,6 +236,7 @@ def test_body_that_leaves_is_retired_whole(make_bodies):
     assert len(observation.spheres) == 2
     assert [body.name for body in observation.bodies] == ["kept"]
     assert observation.health.retired == 1
+    assert observation.health.dissipated == pytest.approx(0.0, abs=1e-9)  # what it has carried off is not lost
 
 
 def test_light_body_gets_a_small_enough_step(make_bodies):
