@@ -28,6 +28,9 @@ def contact_type(precision: Precision) -> type:
         normal_speed: real  # [m/s] v . n, negative while approaching
         slip: vec3  # [m/s] v - (v . n) n, velocity of a relative to b at the contact point, in the tangent plane
         turning: vec3  # [rad/s] angular velocity of a relative to b
+        drift: vec3  # [m/s] slip over the last step, by which springs have grown
+        roll: vec3  # [rad/s] turning over the last step
+        span: real  # [s] for how long they have grown, a step or the time since touch
         radius: real  # [m] effective radius R* = Ra Rb / (Ra + Rb)
         least: real  # [m] radius of the smaller body
         mass: real  # [kg] effective mass m* = ma mb / (ma + mb)

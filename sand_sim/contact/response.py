@@ -31,6 +31,8 @@ def build_meeting(precision: Precision) -> wp.Function:
         contact.normal_speed = wp.dot(velocity, normal)
         contact.slip = velocity - normal * contact.normal_speed
         contact.turning = turning
+        contact.drift = contact.slip
+        contact.roll = turning
         contact.radius = radius
         contact.least = least
         contact.mass = mass
@@ -40,6 +42,24 @@ def build_meeting(precision: Precision) -> wp.Function:
         return contact
 
     return meeting
+
+
+@cache
+def build_drifting(precision: Precision) -> wp.Function:
+    """Warp function ``(contact, velocity, turning) -> contact`` with what the bodies did over the last step.
+
+    Springs that grow by the velocities of half steps, which move the bodies, are leapfrog oscillators and neither gain nor lose;
+    grown by velocities predicted for now they would gain ``(w dt)^3 / 4`` a radian, and dense beds would jitter.
+    """
+    vec3, contact_struct = precision.vec3, contact_type(precision)
+
+    @wp.func
+    def drifting(contact: contact_struct, velocity: vec3, turning: vec3) -> contact_struct:
+        contact.drift = velocity - contact.normal * wp.dot(velocity, contact.normal)
+        contact.roll = turning
+        return contact
+
+    return drifting
 
 
 @cache
@@ -56,7 +76,9 @@ def build_fresh(precision: Precision) -> wp.Function:
     @wp.func
     def fresh(contact: contact_struct, dt: real) -> contact_struct:
         advance = -contact.normal_speed * dt
+        contact.span = dt
         if contact.overlap < advance:
+            contact.span = contact.overlap / advance * dt
             contact.share = contact.overlap / advance + real(0.5)
             # The mean of xi^(1/4) up to an overlap is that at (4/5)^4 of it.
             mean = real(256.0) / real(625.0) * contact.share * advance
@@ -127,17 +149,11 @@ def build_memory_slot(model: ContactModel, precision: Precision, slot: str) -> t
 
 
 @cache
-def build_response(model: ContactModel, precision: Precision, centred: bool) -> wp.Function:
+def build_response(model: ContactModel, precision: Precision) -> wp.Function:
     """Warp function ``(contact, pair, memory, dt) -> (push, drag, moment, memory)`` on body a.
 
     ``push`` [N] acts along the normal and may pull, ``drag`` [N] in the tangent plane at the contact point, ``moment`` [N m] is
     that of rolling and twisting resistance; the memory given back is that of now.
-
-    Args:
-        model: laws.
-        precision: number types.
-        centred: velocities are those of now, and memories those of half a step ago (see ``build_onward``); else velocities are
-            those of half a step ago, and memories those of a step ago.
     """
     vec3, real, types = precision.vec3, precision.real, model.types(precision)
     built = {slot: law.build(precision, types) for slot, law in model.laws.items()}
@@ -159,20 +175,16 @@ def build_response(model: ContactModel, precision: Precision, centred: bool) -> 
         # Where nothing acts across a gap only touching contacts come here.
         if not wp.static(cohesive) or contact.overlap > real(0.0):
             contact = fresh(contact, dt)
-            # Over this time springs have grown since they were last kept, or since touch.
-            span = dt
-            if wp.static(centred):
-                span = dt * (contact.share - real(0.5))
             push = normal(contact, pair)
             if wp.static(has_tangential):
-                drag, slipped = tangential(contact, pair, push, take_slip(memory), span)
+                drag, slipped = tangential(contact, pair, push, take_slip(memory))
                 after = put_slip(after, slipped)
             if wp.static(has_rolling):
-                turn, rolled = rolling(contact, pair, push, take_roll(memory), span)
+                turn, rolled = rolling(contact, pair, push, take_roll(memory))
                 moment += turn
                 after = put_roll(after, rolled)
             if wp.static(has_twisting):
-                twist, twisted = twisting(contact, pair, push, take_twist(memory), span)
+                twist, twisted = twisting(contact, pair, push, take_twist(memory))
                 moment += twist
                 after = put_twist(after, twisted)
         if wp.static(cohesive):
@@ -182,35 +194,6 @@ def build_response(model: ContactModel, precision: Precision, centred: bool) -> 
         return push, drag, moment, after
 
     return response
-
-
-@cache
-def build_onward(model: ContactModel, precision: Precision, centred: bool) -> wp.Function:
-    """Warp function ``(contact, memory, dt) -> memory`` to be kept until the next step.
-
-    With centred velocities springs grow half a step ahead of now: summing them up at half steps is second order, while adding
-    ``v dt`` to the springs of now would lead by half a step, which acts as a damping of ``k dt / 2``.
-    """
-    real, memory_vector = precision.real, memory_type(model, precision)
-    slides, rolls, twists = (centred and bool(model.laws[slot].memory) for slot in ("tangential", "rolling", "twisting"))
-    slip, roll, twist = (model.offset(slot) for slot in ("tangential", "rolling", "twisting"))
-
-    @wp.func
-    def onward(contact: contact_type(precision), memory: memory_vector, dt: real):
-        if contact.overlap > real(0.0):
-            half = real(0.5) * dt
-            spin = wp.dot(contact.turning, contact.normal)
-            rolling = contact.turning - contact.normal * spin
-            for k in range(3):
-                if wp.static(slides):
-                    memory[wp.static(slip) + k] += contact.slip[k] * half
-                if wp.static(rolls):
-                    memory[wp.static(roll) + k] += rolling[k] * half
-            if wp.static(twists):
-                memory[wp.static(twist)] += spin * half
-        return memory
-
-    return onward
 
 
 @cache

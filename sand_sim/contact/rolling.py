@@ -1,6 +1,6 @@
 """Rolling and twisting resistance.
 
-Rolling: ``(contact, pair, normal_force, memory, dt) -> (moment [N m], memory)``, twisting the same; the moment acts on body a,
+Rolling: ``(contact, pair, normal_force, memory) -> (moment [N m], memory)``, twisting the same; the moment acts on body a,
 its opposite on body b. Rolling resists the part of the relative angular velocity in the tangent plane, twisting the part along
 the normal.
 """
@@ -27,7 +27,7 @@ def build_constant(precision: Precision, types: ContactTypes) -> wp.Function:
     real, vec3 = precision.real, precision.vec3
 
     @wp.func
-    def constant(contact: types.contact, pair: types.pair, normal_force: real, memory: vec3, dt: real):
+    def constant(contact: types.contact, pair: types.pair, normal_force: real, memory: vec3):
         rolling = contact.turning - contact.normal * wp.dot(contact.turning, contact.normal)
         rate = wp.length(rolling)
         moment = vec3(real(0.0))
@@ -50,14 +50,15 @@ def build_spring(precision: Precision, types: ContactTypes) -> wp.Function:
     bounded, turned = build_bounded(precision), build_turned(precision)
 
     @wp.func
-    def spring(contact: types.contact, pair: types.pair, normal_force: real, memory: vec3, dt: real):
+    def spring(contact: types.contact, pair: types.pair, normal_force: real, memory: vec3):
         rolling = contact.turning - contact.normal * wp.dot(contact.turning, contact.normal)
         arm = pair.rolling_friction * contact.radius
         stiffness = real(2.25) * arm * arm * pair.rolling_young * contact.patch
         # 7/5 m r^2 is the inertia of a sphere about its contact point.
         inertia = real(7.0) / real(5.0) * contact.mass * contact.least * contact.least
         viscous = rolling * (real(2.0) * real(wp.static(damping)) * wp.sqrt(stiffness * inertia))
-        rolled = turned(memory, contact.normal) + rolling * dt
+        over = contact.roll - contact.normal * wp.dot(contact.roll, contact.normal)
+        rolled = turned(memory, contact.normal) + over * contact.span
         return bounded(rolled, viscous, stiffness, arm * normal_force)
 
     return spring
@@ -96,12 +97,12 @@ def build_marshall(precision: Precision, types: ContactTypes) -> wp.Function:
     real = precision.real
 
     @wp.func
-    def marshall(contact: types.contact, pair: types.pair, normal_force: real, twisted: real, dt: real):
+    def marshall(contact: types.contact, pair: types.pair, normal_force: real, twisted: real):
         rate = wp.dot(contact.turning, contact.normal)
         half = real(0.5) * contact.patch * contact.patch
         stiffness = real(8.0) * pair.shear * contact.patch * half
         viscous = pair.shear_damping * contact.inertia * half * rate
-        angle = twisted + rate * dt
+        angle = twisted + wp.dot(contact.roll, contact.normal) * contact.span
         bound = real(2.0) / real(3.0) * contact.patch * pair.friction * normal_force
         if stiffness * wp.abs(angle) > bound:
             angle = wp.sign(angle) * bound / stiffness

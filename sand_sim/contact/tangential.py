@@ -1,6 +1,6 @@
 """Tangential contact laws.
 
-``(contact, pair, normal_force, memory, dt) -> (force [N], memory)``: the force acts on body a in the tangent plane, the memory is
+``(contact, pair, normal_force, memory) -> (force [N], memory)``: the force acts on body a in the tangent plane, the memory is
 a vec3 and for some laws carries one number more. Laws without memory return it untouched. The energy beside it is
 ``(contact, pair, memory) -> [J]``.
 """
@@ -69,7 +69,7 @@ def build_viscous(precision: Precision, types: ContactTypes) -> wp.Function:
     real, vec3 = precision.real, precision.vec3
 
     @wp.func
-    def viscous(contact: types.contact, pair: types.pair, normal_force: real, spring: vec3, dt: real):
+    def viscous(contact: types.contact, pair: types.pair, normal_force: real, spring: vec3):
         force = contact.slip * -pair.shear_viscosity
         square = wp.dot(force, force)
         bound = pair.friction * normal_force
@@ -93,8 +93,8 @@ def build_linear(precision: Precision, types: ContactTypes) -> wp.Function:
     bounded, turned = build_bounded(precision), build_turned(precision)
 
     @wp.func
-    def linear(contact: types.contact, pair: types.pair, normal_force: real, spring: vec3, dt: real):
-        stretched = turned(spring, contact.normal) + contact.slip * dt
+    def linear(contact: types.contact, pair: types.pair, normal_force: real, spring: vec3):
+        stretched = turned(spring, contact.normal) + contact.drift * contact.span
         viscous = contact.slip * (pair.linear_shear_damping * wp.sqrt(contact.mass) * contact.share)
         return bounded(stretched, viscous, pair.shear_stiffness, pair.friction * normal_force)
 
@@ -132,9 +132,9 @@ def build_mindlin(precision: Precision, types: ContactTypes) -> wp.Function:
     bounded, turned = build_bounded(precision), build_turned(precision)
 
     @wp.func
-    def mindlin(contact: types.contact, pair: types.pair, normal_force: real, spring: vec3, dt: real):
+    def mindlin(contact: types.contact, pair: types.pair, normal_force: real, spring: vec3):
         stiffness = real(8.0) * pair.shear * contact.patch
-        stretched = turned(spring, contact.normal) + contact.slip * dt
+        stretched = turned(spring, contact.normal) + contact.drift * contact.span
         viscous = contact.slip * (pair.shear_damping * contact.inertia)
         return bounded(stretched, viscous, stiffness, pair.friction * normal_force)
 
@@ -164,11 +164,11 @@ def build_mindlin_rescaled(precision: Precision, types: ContactTypes) -> wp.Func
     mindlin = build_mindlin(precision, types)
 
     @wp.func
-    def mindlin_rescaled(contact: types.contact, pair: types.pair, normal_force: real, memory: vec4, dt: real):
+    def mindlin_rescaled(contact: types.contact, pair: types.pair, normal_force: real, memory: vec4):
         spring = vec3(memory[0], memory[1], memory[2])
         if contact.patch < memory[3]:
             spring = spring * (contact.patch / memory[3])
-        force, stretched = mindlin(contact, pair, normal_force, spring, dt)
+        force, stretched = mindlin(contact, pair, normal_force, spring)
         return force, vec4(stretched[0], stretched[1], stretched[2], contact.patch)
 
     return mindlin_rescaled

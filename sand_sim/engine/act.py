@@ -4,7 +4,7 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.response import build_meeting, build_onward, build_response, build_stored_energy, memory_type
+from sand_sim.contact.response import build_meeting, build_response, build_stored_energy, memory_type
 from sand_sim.engine.recipe import Recipe
 from sand_sim.integrator import VERLET
 
@@ -37,8 +37,7 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
     precision, rotation, history, couples = recipe.precision, recipe.rotation, recipe.history, recipe.contact.couples
     real, vec3, vec4 = precision.real, precision.vec3, precision.vec4
     types, memory_vector = recipe.contact.types(precision), memory_type(recipe.contact, precision)
-    centred = recipe.integrator == VERLET
-    response, onward = build_response(recipe.contact, precision, centred), build_onward(recipe.contact, precision, centred)
+    response = build_response(recipe.contact, precision)
     stored_energy = build_stored_energy(recipe.contact, precision)
     meeting, lagging = build_meeting(precision), recipe.integrator != VERLET
 
@@ -78,7 +77,7 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
                 stored_in = meeting(met.normal, overlap, met.slip, met.turning, met.radius, met.least, met.mass)
             energy[contact] = stored_energy(stored_in, pair, after)
         elif wp.static(history):
-            memory[contact] = onward(met, after, dt)
+            memory[contact] = after
 
     @wp.func
     def release(

@@ -80,6 +80,8 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
         place: wp.array(dtype=whole4),
         motion: wp.array(dtype=vec4),
         spin: wp.array(dtype=vec4),
+        sphere_half_motion: wp.array(dtype=vec3),
+        sphere_half_spin: wp.array(dtype=vec3),
         origin: wp.array(dtype=whole4),
         felt_force: wp.array(dtype=vec3),
         felt_torque: wp.array(dtype=vec3),
@@ -149,6 +151,8 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
             turn[b] = turned
             omega_d = spin_of(turned, turning_now, inertia[b])
             omega = vec3(real(omega_d[0]), real(omega_d[1]), real(omega_d[2]))
+            past_d = spin_of(turned, turning, inertia[b])
+            past = vec3(real(past_d[0]), real(past_d[1]), real(past_d[2]))
             rotation = wp.quaternion(real(turned[0]), real(turned[1]), real(turned[2]), real(turned[3]))
             for m in range(first, last):
                 i = sphere_at[m]
@@ -165,6 +169,10 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
                 carried = now + wp.cross(omega, arm)
                 motion[i] = vec4(carried[0], carried[1], carried[2], motion[i][3])
                 spin[i] = vec4(omega[0], omega[1], omega[2], spin[i][3])
+                if wp.static(verlet):
+                    # The arm in the middle of the step.
+                    sphere_half_motion[i] = velocity + wp.cross(past, arm - wp.cross(past, arm) * (real(0.5) * dt))
+                    sphere_half_spin[i] = past
                 began = origin[i]
                 moved = vec3(real(u - began[0]), real(v - began[1]), real(w - began[2]))
                 if wp.dot(moved, moved) > half_skin * half_skin:

@@ -4,7 +4,7 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.response import build_meeting, memory_type
+from sand_sim.contact.response import build_drifting, build_meeting, memory_type
 from sand_sim.engine.act import build_act, build_acts
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.recipe import Recipe
@@ -64,6 +64,7 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     types, memory_vector = recipe.contact.types(precision), memory_type(recipe.contact, precision)
     excess_of, direction = build_excess(precision), build_direction(precision)
     meeting, acts = build_meeting(precision), build_acts(recipe)
+    drifting, halves = build_drifting(precision), recipe.halves
     act, release = build_act(recipe, measuring)
 
     @kernel
@@ -76,6 +77,8 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
         place: wp.array(dtype=whole4),
         motion: wp.array(dtype=vec4),
         spin: wp.array(dtype=vec4),
+        half_motion: wp.array(dtype=vec3),
+        half_spin: wp.array(dtype=vec3),
         material: wp.array(dtype=int),
         table: wp.array(dtype=types.pair),
         kinds: int,
@@ -123,6 +126,12 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                 radius = radius_a * radius_b / reach
                 mass = of_a[3] * of_b[3] / (of_a[3] + of_b[3])
                 met = meeting(normal, overlap, velocity, relative_spin, radius, least, mass)
+                if wp.static(halves):
+                    past_a = half_spin[a]
+                    past_b = half_spin[b]
+                    past = half_motion[a] - half_motion[b]
+                    past -= wp.cross(past_a * (radius_a - half) + past_b * (radius_b - half), normal)
+                    met = drifting(met, past, past_a - past_b)
                 pair = table[0]
                 if wp.static(materials):
                     pair = table[material[a] * kinds + material[b]]

@@ -35,6 +35,11 @@ class Recipe:
         return self.bodies or self.contact.rotation
 
     @property
+    def halves(self) -> bool:
+        """Whether springs grow by velocities of half steps that are kept beside those of now."""
+        return self.history and self.integrator == VERLET
+
+    @property
     def history(self) -> bool:
         """Whether contacts remember."""
         return self.contact.history

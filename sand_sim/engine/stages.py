@@ -225,7 +225,8 @@ def body_stage(arrays: DemArrays, recorder) -> None:
     precision, flags = arrays.recipe.precision, arrays.flags
     inputs = [bodies.starts, bodies.sphere_at, bodies.offset, bodies.place, bodies.remainder, bodies.motion]
     inputs += [bodies.half_motion, bodies.turn, bodies.momentum, bodies.inertia]
-    inputs += [grains.place, grains.motion, grains.spin, grains.origin, arrays.felt_force, arrays.felt_torque]
+    inputs += [grains.place, grains.motion, grains.spin, grains.half_motion, grains.half_spin, grains.origin]
+    inputs += [arrays.felt_force, arrays.felt_torque]
     inputs += [precision.vec3(*setting.gravity), setting.dt, lattice.quantum]
     inputs += [precision.whole3(*lattice.half_extent.tolist()), lattice.end, 0.5 * setting.skin / lattice.quantum]
     inputs += [flags.starting, arrays.carried_off, flags.grains_moved, flags.fault]
@@ -288,6 +289,8 @@ def _grain_arguments(arrays: DemArrays, contacts: ContactList) -> list:
         grains.place,
         grains.motion,
         grains.spin,
+        grains.half_motion,
+        grains.half_spin,
         grains.material,
         arrays.pairs,
         arrays.kinds,

@@ -4,7 +4,7 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.response import build_meeting, memory_type
+from sand_sim.contact.response import build_drifting, build_meeting, memory_type
 from sand_sim.engine.act import build_act, build_acts
 from sand_sim.engine.contact_list import listed_at
 from sand_sim.engine.kernel import kernel
@@ -154,6 +154,7 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     from_anchor, nearest = build_from_anchor(precision, surfaces), build_nearest(surfaces)
     surface_of, (_, _, sphere_at) = build_surface_of(recipe), build_sphere_at()
     meeting, acts = build_meeting(precision), build_acts(recipe)
+    drifting, halves = build_drifting(precision), recipe.halves
     act, release = build_act(recipe, measuring)
     rough, moving = ROUGH in surfaces, PLUNGER in surfaces
 
@@ -167,6 +168,8 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
         place: wp.array(dtype=whole4),
         motion: wp.array(dtype=vec4),
         spin: wp.array(dtype=vec4),
+        half_motion: wp.array(dtype=vec3),
+        half_spin: wp.array(dtype=vec3),
         material: wp.array(dtype=int),
         table: wp.array(dtype=types.pair),
         kinds: int,
@@ -213,17 +216,21 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
             if acts(contact, overlap > real(0.0), memory):
                 normal = vec3(real(way[0]), real(way[1]), real(way[2]))
                 of_i = motion[i]
-                velocity = vec3(of_i[0], of_i[1], of_i[2])
+                of_wall = vec3(real(0.0))
                 if wp.static(moving):
                     if wall.plunger >= 0:
                         along = vec3(real(wall.direction[0]), real(wall.direction[1]), real(wall.direction[2]))
-                        velocity -= along * real(plungers[wall.plunger].seen)
+                        of_wall = along * real(plungers[wall.plunger].seen)
+                velocity = vec3(of_i[0], of_i[1], of_i[2]) - of_wall
                 turning = vec3(real(0.0))
                 if wp.static(rotation):
                     spin_i = spin[i]
                     turning = vec3(spin_i[0], spin_i[1], spin_i[2])
                     velocity -= wp.cross(turning, normal) * (radius - share * overlap)
                 met = meeting(normal, overlap, velocity, turning, law_radius, least, of_i[3])
+                if wp.static(halves):
+                    past = half_spin[i]
+                    met = drifting(met, half_motion[i] - of_wall - wp.cross(past, normal) * (radius - share * overlap), past)
                 kind = int(0)
                 if wp.static(materials):
                     kind = material[i]

@@ -8,7 +8,7 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.contact.response import build_meeting, memory_type
+from sand_sim.contact.response import build_drifting, build_meeting, memory_type
 from sand_sim.engine.act import build_act, build_acts
 from sand_sim.engine.contact_list import listed_at
 from sand_sim.engine.kernel import kernel
@@ -124,6 +124,7 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     shape_type, state_type = tool_types(precision)
     from_tool, direction = build_from_tool(precision), build_direction(precision)
     meeting, acts = build_meeting(precision), build_acts(recipe)
+    drifting, halves = build_drifting(precision), recipe.halves
     act, release = build_act(recipe, measuring)
 
     @kernel
@@ -136,6 +137,8 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
         place: wp.array(dtype=whole4),
         motion: wp.array(dtype=vec4),
         spin: wp.array(dtype=vec4),
+        half_motion: wp.array(dtype=vec3),
+        half_spin: wp.array(dtype=vec3),
         material: wp.array(dtype=int),
         table: wp.array(dtype=types.pair),
         kinds: int,
@@ -179,6 +182,10 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                 met = meeting(
                     normal, overlap, velocity, turning, radius * shape.radius / reach, wp.min(radius, shape.radius), of_i[3]
                 )
+                if wp.static(halves):
+                    past = half_motion[i] - state.velocity - wp.cross(state.spin, point)
+                    past -= wp.cross(half_spin[i], normal) * (radius - half)
+                    met = drifting(met, past, half_spin[i] - state.spin)
                 kind = int(0)
                 if wp.static(materials):
                     kind = material[i]

@@ -28,7 +28,7 @@ class ReferenceDem:
         self.m = density * 4.0 / 3.0 * np.pi * self.r**3
         self.inertia = 0.4 * self.m * self.r**2
         self.laws, self.planes, self.integrator = laws, planes, integrator
-        self.pair = pair | {"dt": dt, "centred": integrator == "velocity_verlet"}
+        self.pair = pair | {"dt": dt}
         self.memories = defaultdict(dict)
         self.half = None  # velocity and spin half a step ago
 
@@ -36,6 +36,7 @@ class ReferenceDem:
         """Of all grains, linear and angular."""
         force, torque = self.m[:, None] * self.g, np.zeros_like(self.x)
         n = len(self.r)
+        hv, hw = self.half or (self.v, self.w)
         for i in range(n):
             for j in range(i + 1, n):
                 apart = self.x[i] - self.x[j]
@@ -47,6 +48,8 @@ class ReferenceDem:
                 at_i = self.v[i] + np.cross(self.w[i], -arm_i * normal)
                 at_j = self.v[j] + np.cross(self.w[j], arm_j * normal)
                 c = {"normal": normal, "overlap": overlap, "velocity": at_i - at_j, "spin": self.w[i] - self.w[j]}
+                past_i, past_j = hv[i] + np.cross(hw[i], -arm_i * normal), hv[j] + np.cross(hw[j], arm_j * normal)
+                c |= {"drift": past_i - past_j, "roll": hw[i] - hw[j]}
                 c["radius"] = self.r[i] * self.r[j] / (self.r[i] + self.r[j])
                 c["mass"] = self.m[i] * self.m[j] / (self.m[i] + self.m[j])
                 c["least"] = min(self.r[i], self.r[j])
@@ -63,6 +66,7 @@ class ReferenceDem:
                     continue
                 at = self.v[i] + np.cross(self.w[i], -distance * normal)
                 c = {"normal": normal, "overlap": overlap, "velocity": at, "spin": self.w[i]}
+                c |= {"drift": hv[i] + np.cross(hw[i], -distance * normal), "roll": hw[i]}
                 c |= {"radius": self.r[i], "mass": self.m[i], "least": self.r[i]}
                 pull, moment = respond(self.laws, c, self.pair, self.memories["plane", k, i])
                 force[i] += pull

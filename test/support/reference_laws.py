@@ -1,7 +1,8 @@
 """Contact laws in NumPy, float64, written from the equations of their sources: the yardstick for the kernels.
 
-A contact is a dict of normal (from b to a), overlap, velocity of a against b at the contact point, spin of a against b, radius
-R*, mass m*, and the radius of the smaller body. A pair is a dict of numbers, a memory a dict that the laws write to.
+A contact is a dict of normal (from b to a), overlap, velocity of a against b at the contact point, spin of a against b, both also
+over the last step (drift, roll), radius R*, mass m*, and the radius of the smaller body. A pair is a dict of numbers, a memory a
+dict that the laws write to.
 """
 
 import numpy as np
@@ -41,8 +42,9 @@ def damped(c, p):
 
 
 def growth(c, p):
-    """Time by which springs have grown since they were last kept: at half steps where velocities are those of now."""
-    return (damped(c, p)[0] - 0.5) * p["dt"] if p["centred"] else p["dt"]
+    """Time over which springs have grown: a step, or that since touch."""
+    rate, _ = split(c["velocity"], c["normal"])
+    return min(p["dt"], c["overlap"] / -rate) if rate < 0.0 else p["dt"]
 
 
 def hertz(c, p, memory):
@@ -67,7 +69,7 @@ def viscoelastic(c, p, memory):
 
 def bounded(c, p, memory, push, stiffness, viscosity):
     _, slip = split(c["velocity"], c["normal"])
-    spring = turned(memory.get("spring", np.zeros(3)), c["normal"]) + slip * growth(c, p)
+    spring = turned(memory.get("spring", np.zeros(3)), c["normal"]) + split(c["drift"], c["normal"])[1] * growth(c, p)
     bound = p["friction"] * push
     memory["spring"] = cut(spring, bound / stiffness)
     return cut(-stiffness * memory["spring"] - viscosity * slip, bound)
@@ -106,7 +108,7 @@ def rolling_constant(c, p, memory, push):
 
 def rolling_spring(c, p, memory, push):
     _, rolling = split(c["spin"], c["normal"])
-    angle = turned(memory.get("rolled", np.zeros(3)), c["normal"]) + rolling * growth(c, p)
+    angle = turned(memory.get("rolled", np.zeros(3)), c["normal"]) + split(c["roll"], c["normal"])[1] * growth(c, p)
     arm = p["rolling_friction"] * c["radius"]
     stiffness = 2.25 * 2.0 * p["young"] * np.sqrt(c["radius"] * c["overlap"]) * arm**2
     damping = 2.0 * 0.3 * np.sqrt(stiffness * 7.0 / 5.0 * c["mass"] * c["least"] ** 2)
@@ -120,7 +122,7 @@ def twisting_marshall(c, p, memory, push):
     stiffness = 8.0 * p["shear"] * patch
     share, overlap = damped(c, p)
     damping = share * 2.0 * p["ratio"] * np.sqrt(8.0 * p["shear"] * np.sqrt(c["radius"] * overlap) * c["mass"])
-    angle = memory.get("twisted", 0.0) + rate * growth(c, p)
+    angle = memory.get("twisted", 0.0) + split(c["roll"], c["normal"])[0] * growth(c, p)
     bound = 2.0 / 3.0 * patch * p["friction"] * push
     limit = bound / (0.5 * patch**2 * stiffness)
     memory["twisted"] = np.clip(angle, -limit, limit)
@@ -194,10 +196,4 @@ def respond(laws, c, p, memory):
         for name in ("spring", "patch", "rolled", "twisted"):
             memory.pop(name, None)
     pull = LAWS["cohesion"][laws["cohesion"]](c, p, memory)
-    if p["centred"] and c["overlap"] > 0.0:
-        _, slip = split(c["velocity"], c["normal"])
-        twist, roll = split(c["spin"], c["normal"])
-        for name, rate in (("spring", slip), ("rolled", roll), ("twisted", twist)):
-            if name in memory:
-                memory[name] = memory[name] + 0.5 * p["dt"] * rate
     return (push - pull) * c["normal"] + drag, moment
