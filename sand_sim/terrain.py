@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 
 from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_body
+from sampler.surface import Surface
 from sand_sim import rotation
 from sand_sim.scene.heights import read_heights
 from sand_sim.scene.types import Boundary, Pose, SceneError, Terrain
@@ -47,10 +48,13 @@ class Ground:
         Positive outside a closed mesh, and on the side that the normals of an open one point to.
         """
         local = position - self.place
-        signed, closest, normal = SignedDistance(self.mesh).query(local)
-        if not self.mesh.is_watertight:
-            signed = np.copysign(signed, np.einsum("ij,ij->i", local - closest, normal))
-        return signed - self.body.radius
+        if self.mesh.is_watertight:
+            return SignedDistance(self.mesh).query(local)[0] - self.body.radius
+        surface = Surface(np.asarray(self.mesh.triangles, float), "cpu")
+        closest, face = surface.closest(local)
+        away = local - closest
+        side = np.einsum("ij,ij->i", away, surface.normals[face])
+        return np.copysign(np.linalg.norm(away, axis=1), side) - self.body.radius
 
 
 def model_ground(boundary: Boundary, folder: Path, progress: Callable[[float], None]) -> Ground:
