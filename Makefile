@@ -1,5 +1,5 @@
 # make demo   a bucket digs in sand, through ROS topics; make demo VIEW=1 also opens the viewer
-# make test   all quick tests;  make test-full also those that take minutes
+# make test   all quick tests, on all cores;  make test-full also those that take minutes
 # Needs Python 3.12 and make; everything else is installed into .venv.
 
 PYTHON ?= python3
@@ -18,7 +18,7 @@ run: $(READY)
 	$(VENV)/bin/sand_sim run $(SCENE) --out $(OUT) $(if $(VIEW),--view)
 
 test: $(READY)
-	$(VENV)/bin/python -m pytest -m "not slow"
+	$(VENV)/bin/python -m pytest -n logical --dist loadgroup -m "not slow"
 
 test-full: $(READY)
 	$(VENV)/bin/python -m pytest

@@ -11,6 +11,8 @@ from scenes import write_small_scene
 
 PATIENCE = 120.0
 
+pytestmark = pytest.mark.xdist_group("processes")  # one after the other, as those of the node
+
 
 def sand_sim(folder, *words, **further):
     command = [sys.executable, "-m", "sand_sim", *map(str, words)]
