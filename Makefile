@@ -21,7 +21,7 @@ test: $(READY)
 	$(VENV)/bin/python -m pytest -n logical --dist loadgroup -m "not slow"
 
 test-full: $(READY)
-	$(VENV)/bin/python -m pytest
+	$(VENV)/bin/python -m pytest -n logical --dist loadgroup
 
 lint: $(READY)
 	$(VENV)/bin/ruff check --fix .
