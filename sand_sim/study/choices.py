@@ -18,7 +18,9 @@ def stiff(factor: float, quick: bool = False) -> Variation:
 
 def coarse(factor: float, quick: bool = False) -> Variation:
     """Larger grains, as many as fill the same space."""
+    # Tool particles grow with the grains, which else would touch many of them at once.
     edits = (Edit("fills.*.radius", times(factor)), Edit("fills.*.count", counted(factor**-3)))
+    edits += (Edit("tools.*.particle_radius", times(factor)),)
     return Variation("grain size", f"radius x {factor:g}", edits, quick)
 
 

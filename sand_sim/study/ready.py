@@ -50,13 +50,18 @@ _DIG = Preparation(
         "grains 1.3 times as large, bed 0.45 m long, up to 1.2 s, 0.9 s of them in the cut",
         (
             Edit("fills.*.radius", times(1.3)),
+            Edit("tools.*.particle_radius", times(1.3)),
             Edit("fills.*.region.high.0", to(0.45)),
             Edit("boundaries.*.high.0", to(0.45)),
             Edit("settle.time", to(0.4)),
             Edit("duration", to(1.2)),
         ),
     ),
-    quick=Variation("", "grains another 1.2 times as large", (Edit("fills.*.radius", times(1.2)), Edit("settle.time", to(0.3)))),
+    quick=Variation(
+        "",
+        "grains another 1.2 times as large",
+        (Edit("fills.*.radius", times(1.2)), Edit("tools.*.particle_radius", times(1.2)), Edit("settle.time", to(0.3))),
+    ),
 )
 _READY = {"impact.yaml": _IMPACT, "column.yaml": _COLUMN, "dig.yaml": _DIG}
 
