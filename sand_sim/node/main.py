@@ -21,11 +21,10 @@ def main(arguments: list[str] | None = None) -> int:
     from sand_sim.scene.types import SceneError
 
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
-    node = None
+    executor, node = SingleThreadedExecutor(), None
     try:
         interruption.check()
         node = SandSimNode(progress=interruption.check)
-        executor = SingleThreadedExecutor()
         executor.add_node(node)
         while not (interruption.asked or node.done):
             executor.spin_once(timeout_sec=0.1)
@@ -38,5 +37,6 @@ def main(arguments: list[str] | None = None) -> int:
     finally:
         if node is not None:
             node.close()
+            executor.shutdown()  # it holds on to what it waits for
             node.destroy_node()
         rclpy.try_shutdown()

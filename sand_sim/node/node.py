@@ -55,6 +55,13 @@ class SandSimNode(Node):
 
     def __init__(self, progress=lambda stage, share: None, **node_arguments):
         super().__init__("sand_sim", **node_arguments)
+        try:
+            self._prepare(progress)
+        except BaseException:
+            self.destroy_node()  # else its share of the middleware outlives it
+            raise
+
+    def _prepare(self, progress) -> None:
         declare_parameters(self)
         self._settings = settings = read_parameters(self)
         scene = load_scene(find_scene(settings["scene"]))

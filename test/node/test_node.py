@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -323,16 +324,32 @@ def test_signals_end_the_node_cleanly(start_process, tmp_path, number, delay):
     assert "Traceback" not in errors
 
 
-def test_nothing_is_left_behind(start_process, tmp_path):
-    """No shared-memory segments of ours remain after a node has ended."""
-    write_small_scene(tmp_path)
-    before = set(os.listdir("/dev/shm"))
+def shared_memory(process):
+    """Names of the middleware's shared-memory files of a running process; other processes of this machine have theirs."""
+    paths = [line.split()[-1] for line in Path(f"/proc/{process}/maps").read_text().splitlines()]
+    return {Path(path).name for path in paths if path.startswith("/dev/shm/") and "fastrtps" in path}
+
+
+@pytest.mark.skipif(not Path("/proc/self/maps").is_file(), reason="needs /proc")
+@pytest.mark.parametrize("ready", [True, False])
+def test_nothing_is_left_behind(start_process, tmp_path, ready):
+    """No shared memory of ours remains, whether a node ends when it is ready or while it gets ready."""
+    write_small_scene(tmp_path, **({} if ready else {"settle": {"time": 1000.0, "speed": 1e-9}}))
     process = start_process(scene="small.yaml", pacing="lockstep")
-    time.sleep(3.0)
+    if ready:
+        while "is ready" not in process.stderr.readline():
+            assert process.poll() is None
+    else:
+        end = time.monotonic() + PATIENCE
+        while not shared_memory(process.pid):
+            assert time.monotonic() < end
+            time.sleep(0.01)
+    ours = shared_memory(process.pid)
+    assert ours, "else there is nothing to clean up"
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
-    assert set(os.listdir("/dev/shm")) - before == set()
+    assert ours & set(os.listdir("/dev/shm")) == set()
 
 
 FORCED = {"time_step": 9e-4, "force_time_step": True}  # blows up when the grains have fallen on to the floor
