@@ -50,7 +50,8 @@ def model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
         path = locate_mesh(tool.mesh, scene.folder)
         mesh = read_mesh(path, tool.scale)
         show = partial(progress, f"sampling {tool.name}")
-        body = sample_file(path, tool.particle_radius, tool.scale, grain=_smallest_grain(scene), progress=show)
+        fineness = {"spacing": tool.particle_spacing, "grain": _smallest_grain(scene)}
+        body = sample_file(path, tool.particle_radius, tool.scale, progress=show, **fineness)
     except MeshError as error:
         raise SceneError(f"tools.{tool.name}.mesh: {error}") from None
     return ToolModel(tool, mesh, body)

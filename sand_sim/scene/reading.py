@@ -181,7 +181,7 @@ def _fill(entry: Field, folder: Path) -> Fill:
 
 def _tool(name: str, entry: Field) -> Tool:
     entry.keys(
-        ("mesh", "material", "particle_radius", "scale", "pose", "max_speed", "trajectory"),
+        ("mesh", "material", "particle_radius", "particle_spacing", "scale", "pose", "max_speed", "trajectory"),
         required=("mesh", "material", "particle_radius"),
     )
     if not name.isidentifier():
@@ -200,6 +200,7 @@ def _tool(name: str, entry: Field) -> Tool:
         mesh=entry["mesh"].text(),
         material=entry["material"].text(),
         particle_radius=entry["particle_radius"].number(above=0.0, unit="m"),
+        particle_spacing=entry.optional("particle_spacing", lambda f: f.number(above=0.0, unit="m"), None),
         scale=entry.optional("scale", lambda f: f.number(above=0.0), 1.0),
         pose=entry.optional("pose", read_pose, initial),
         max_speed=entry.optional("max_speed", lambda f: f.number(above=0.0, unit="m/s"), 2.0),

@@ -176,6 +176,7 @@ class Tool:
     mesh: str
     material: str
     particle_radius: float  # [m]
+    particle_spacing: float | None = None  # [m]; None: chosen from radius and grains
     scale: float = 1.0  # [m per mesh unit]
     pose: Pose = Pose()
     max_speed: float = 2.0  # [m/s] of any point of the tool; faster commands are rejected

@@ -1,0 +1,92 @@
+"""Speed of the step: settled beds of spheres (W1) and of four-sphere grains (W2), and a blade drawn through a bed (W3).
+
+Grains of 2 mm, Hertz and Mindlin with history, friction 0.5, restitution 0.5, single precision, the automatic time step. The
+coordination number printed beside the speed shows that the work is that of a settled bed.
+"""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from benchmarks.beds import RADIUS, WIDTHS, bed_scene, find_bed
+from sand_sim import ToolPose, World, read_scene
+
+BLADE_SPEED = 0.1  # [m/s]
+BLADE = {"low": (0.025, 0.02, 0.014), "high": (0.025, 0.06, 0.038), "particles": 1025}  # a sheet [m]
+
+
+@dataclass
+class Workload:
+    """A world that is timed.
+
+    Attributes:
+        name: of the case.
+        world: ready to step.
+        blade: whether its tool is drawn along x.
+    """
+
+    name: str
+    world: World
+    blade: bool = False
+
+    def run(self, steps: int) -> float:
+        """Wall time [s] of some steps."""
+        world = self.world
+        if self.blade:
+            end = world.time + steps * world.time_step
+            world.apply(ToolPose("blade", np.array([BLADE_SPEED * end, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]), end))
+        begin = time.perf_counter()
+        world.step(steps)
+        return time.perf_counter() - begin
+
+    @property
+    def grains(self) -> int:
+        """Grains, each of them one sphere or one clump."""
+        return len(self.world.observe().grains)
+
+    def figures(self) -> dict:
+        """What shows that the work is the same: grains, spheres, contacts; and what speaks against the run."""
+        observation, spheres = self.world.observe(), len(self.world.assembly.table)
+        health = observation.health
+        return {
+            "grains": len(observation.grains),
+            "spheres": spheres,
+            "coordination_number": round(2.0 * health.contacts / len(observation.grains), 3),
+            "doubts": list(health.doubts),
+        }
+
+
+def make_workload(name: str, beds: Path | None, folder: Path, threads: int) -> Workload:
+    """A case on a number of threads.
+
+    Args:
+        name: W1-8000, W1-32000, W1-32000-idle (with ten tools far from the bed), W2, or W3.
+        beds: folder of settled beds, or None.
+        folder: for beds settled here.
+        threads: cores.
+    """
+    fields = {"solver": {"threads": threads}}
+    if name == "W2":
+        bed, shape = "bed_clumps_8000", "tetrahedron"
+    elif name == "W3":
+        bed, shape = "bed_blade_grains", "sphere"
+        fields["tools"] = {"blade": _blade(folder)}
+    else:
+        bed, shape = "bed_" + name.split("-")[1], "sphere"
+    if name.endswith("idle"):
+        far = {"position": [0.0, 0.0, 0.1]}
+        fields["tools"] = {f"blade_{k}": _blade(folder) | {"pose": far} for k in range(10)}
+    scene = bed_scene(WIDTHS[bed], find_bed(bed, beds, folder), shape=shape, **fields)
+    return Workload(name, World(read_scene(scene, folder)), blade=name == "W3")
+
+
+def _blade(folder: Path) -> dict:
+    low, high = np.array(BLADE["low"]), np.array(BLADE["high"])
+    path = folder / "blade.stl"
+    corners = [low, (low[0], high[1], low[2]), high, (low[0], low[1], high[2])]
+    trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]]).export(path)
+    spacing = float(np.sqrt(2.0 * np.prod((high - low)[1:]) / (np.sqrt(3.0) * BLADE["particles"])))
+    return {"mesh": str(path), "material": "sand", "particle_radius": RADIUS, "particle_spacing": spacing, "max_speed": 0.2}
