@@ -55,7 +55,6 @@ def find_bed(name: str, beds: Path | None, folder: Path) -> Path:
     else:
         columns = settle(8000 if "8000" in name else 32000, WIDTHS[name], "tetrahedron" if clumps else "sphere", folder)
     radius = RADIUS * tetrahedron().equal_radius if clumps else RADIUS
-    folder.mkdir(parents=True, exist_ok=True)
     np.savez(path, radius=np.full(len(columns["position"]), radius), **columns)
     return path
 

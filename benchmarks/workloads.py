@@ -34,13 +34,16 @@ class Workload:
 
     def run(self, steps: int) -> float:
         """Wall time [s] of some steps."""
-        world = self.world
-        if self.blade:
-            end = world.time + steps * world.time_step
-            world.apply(ToolPose("blade", np.array([BLADE_SPEED * end, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]), end))
+        self.steer(steps)
         begin = time.perf_counter()
-        world.step(steps)
+        self.world.step(steps)
         return time.perf_counter() - begin
+
+    def steer(self, steps: int) -> None:
+        """Send the blade on its way for some steps."""
+        if self.blade:
+            end = self.world.time + steps * self.world.time_step
+            self.world.apply(ToolPose("blade", np.array([BLADE_SPEED * end, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]), end))
 
     @property
     def grains(self) -> int:
@@ -68,6 +71,8 @@ def make_workload(name: str, beds: Path | None, folder: Path, threads: int) -> W
         folder: for beds settled here.
         threads: cores.
     """
+    folder = folder.resolve()
+    folder.mkdir(parents=True, exist_ok=True)
     fields = {"solver": {"threads": threads}}
     if name == "W2":
         bed, shape = "bed_clumps_8000", "tetrahedron"

@@ -140,10 +140,11 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         surfaces=kinds_of(walls),
     )
     pairs = _pair_table(scene, order, precision)
-    skin = scene.solver.skin or _SKIN * float(table.radius.mean())
+    mean = float(table.radius.mean())
+    skin, radius = (scene.solver.skin, 0.0) if scene.solver.skin else (_SKIN * mean, mean)
     arrays = DemArrays(
         recipe,
-        Setting(np.asarray(scene.gravity), time_step.value, skin, _reach(scene, table, order)),
+        Setting(np.asarray(scene.gravity), time_step.value, skin, radius, _reach(scene, table, order)),
         lattice,
         table,
         make_surfaces(walls, order, lattice, float(table.radius.min())),

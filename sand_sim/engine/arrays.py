@@ -16,6 +16,7 @@ from sand_sim.engine.grains import Grains
 from sand_sim.engine.lattice import Lattice
 from sand_sim.engine.plungers import SUM_BLOCK, Plungers
 from sand_sim.engine.recipe import Recipe
+from sand_sim.engine.skin import Skin
 from sand_sim.engine.sorting import SortedItems
 from sand_sim.engine.surfaces import Surface
 from sand_sim.engine.tool_body import ToolBody, Tools
@@ -33,13 +34,15 @@ class Setting:
     Attributes:
         gravity: shape (3,) [m/s^2].
         dt: time step [s].
-        skin: how far grains may move, together, before the lists are made anew [m].
+        skin: how far two grains may approach each other before the lists are made anew, at most [m].
+        radius: of a grain, on the mean [m]; 0 to keep the skin at its widest.
         reach: widest gap across which a contact acts, zero without cohesion [m].
     """
 
     gravity: np.ndarray
     dt: float
     skin: float
+    radius: float = 0.0
     reach: float = 0.0
 
     @property
@@ -80,6 +83,7 @@ class DemArrays:
         self.recipe, self.setting, self.lattice, self.lanes, self.device = recipe, setting, lattice, lanes, device
         precision, number = recipe.precision, len(table)
         self.flags = Flags(device)
+        self.skin = Skin(setting.skin / lattice.quantum, setting.radius / lattice.quantum, device)
         self.grains = Grains(table, lattice, recipe, lanes, device)
         self.bodies = Bodies(table, lattice, recipe, lanes, device) if recipe.bodies else None
         self.felt_force = self.felt_torque = None

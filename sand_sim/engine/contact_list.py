@@ -11,7 +11,7 @@ import warp as wp
 from sand_sim.contact.response import memory_type
 from sand_sim.engine.count import Count, share_out
 from sand_sim.engine.flags import FAULT_ROOM, Flags
-from sand_sim.engine.kernel import kernel
+from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.sorting import record_running_totals
 
@@ -69,8 +69,8 @@ class ContactList:
 def listed_at(starts: wp.array(dtype=int), partner: wp.array(dtype=int), grain: int, other: int) -> int:
     """Index of the contact of a grain with a partner, or -1 if it is not listed."""
     found = int(-1)
-    for contact in range(starts[grain], starts[grain + 1]):
-        if partner[contact] == other:
+    for contact in range(starts[grain], starts[sure(grain + 1)]):
+        if partner[sure(contact)] == other:
             found = contact
     return found
 

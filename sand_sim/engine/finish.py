@@ -30,7 +30,7 @@ def build_place_tools(precision: Precision) -> wp.Kernel:
         dt: wp.float64,
         steps_done: wp.array(dtype=wp.int64),
         travelled: wp.array(dtype=wp.float64),
-        allowance: wp.float64,
+        skin: wp.array(dtype=wp.float64),
         tools_moved: wp.array(dtype=int),
     ):
         time = wp.float64(steps_done[0]) * dt
@@ -39,7 +39,7 @@ def build_place_tools(precision: Precision) -> wp.Kernel:
             if time > track.begin_time and time - dt < track.end_time:
                 rate = wp.length(track.velocity) + wp.length(track.spin) * wp.float64(shapes[tool].extent)
                 travelled[tool] = travelled[tool] + rate * dt
-                if travelled[tool] > allowance:
+                if travelled[tool] * inverse_quantum > wp.float64(0.5) * skin[0]:
                     tools_moved[0] = 1
             states[tool] = tool_state_at(track, time, centre, inverse_quantum, end)
 

@@ -39,3 +39,9 @@ def fill_gaps(launched: wp.Kernel, inputs: list, device: str) -> list:
     """
     types = [argument.type for argument in launched.adj.args]
     return [_nothing(t.dtype, device) if value is None else value for t, value in zip(types, inputs, strict=True)]
+
+
+@wp.func
+def sure(index: int) -> int:
+    """An index that is never negative. Told so, the compiler leaves out what Warp does for negative ones at each access."""
+    return index & 0x7FFFFFFF

@@ -1,90 +1,14 @@
-"""Newton-Euler for single spheres: gather the forces of a grain's contacts, then move it."""
+"""Newton-Euler for single spheres."""
 
 from functools import cache
 
 import warp as wp
 
 from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_TOO_FAST
-from sand_sim.engine.kernel import kernel
+from sand_sim.engine.gather import build_gather
+from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.recipe import Recipe
 from sand_sim.integrator import VERLET
-
-
-@cache
-def build_gather_listed(recipe: Recipe) -> wp.Function:
-    """Warp function that sums force and torque over the contacts a grain owns in one list."""
-    real, vec3, vec4 = recipe.precision.real, recipe.precision.vec3, recipe.precision.vec4
-    rotation, couples = recipe.rotation, recipe.contact.couples
-
-    @wp.func
-    def gather_listed(
-        grain: int,
-        radius: real,
-        starts: wp.array(dtype=int),
-        force: wp.array(dtype=vec3),
-        couple: wp.array(dtype=vec4),
-        moment: wp.array(dtype=vec3),
-    ):
-        total = vec3(real(0.0))
-        torque = vec3(real(0.0))
-        for contact in range(starts[grain], starts[grain + 1]):
-            total += force[contact]
-            if wp.static(rotation):
-                turn = couple[contact]
-                torque += vec3(turn[0], turn[1], turn[2]) * (radius - turn[3])
-            if wp.static(couples):
-                torque += moment[contact]
-        return total, torque
-
-    return gather_listed
-
-
-@cache
-def build_gather(recipe: Recipe, walls: bool, tools: bool) -> wp.Function:
-    """Warp function that sums force [N] and torque [N m] over all contacts of a grain, in the order of the lists."""
-    vec3, vec4, real = recipe.precision.vec3, recipe.precision.vec4, recipe.precision.real
-    rotation, couples = recipe.rotation, recipe.contact.couples
-    gather_listed = build_gather_listed(recipe)
-
-    @wp.func
-    def gather(
-        i: int,
-        radius: real,
-        pair_starts: wp.array(dtype=int),
-        pair_force: wp.array(dtype=vec3),
-        pair_couple: wp.array(dtype=vec4),
-        pair_moment: wp.array(dtype=vec3),
-        met_starts: wp.array(dtype=int),
-        met_pairs: wp.array(dtype=int),
-        wall_starts: wp.array(dtype=int),
-        wall_force: wp.array(dtype=vec3),
-        wall_couple: wp.array(dtype=vec4),
-        wall_moment: wp.array(dtype=vec3),
-        tool_starts: wp.array(dtype=int),
-        tool_force: wp.array(dtype=vec3),
-        tool_couple: wp.array(dtype=vec4),
-        tool_moment: wp.array(dtype=vec3),
-    ):
-        total, torque = gather_listed(i, radius, pair_starts, pair_force, pair_couple, pair_moment)
-        for k in range(met_starts[i], met_starts[i + 1]):
-            contact = met_pairs[k]
-            total -= pair_force[contact]
-            if wp.static(rotation):
-                turn = pair_couple[contact]
-                torque += vec3(turn[0], turn[1], turn[2]) * (radius - turn[3])
-            if wp.static(couples):
-                torque -= pair_moment[contact]
-        if wp.static(walls):
-            push, turned = gather_listed(i, radius, wall_starts, wall_force, wall_couple, wall_moment)
-            total += push
-            torque += turned
-        if wp.static(tools):
-            push, turned = gather_listed(i, radius, tool_starts, tool_force, tool_couple, tool_moment)
-            total += push
-            torque += turned
-        return total, torque
-
-    return gather
 
 
 @cache
@@ -150,13 +74,14 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
         quantum: real,
         half_extent: whole3,
         parking: whole,
-        half_skin: real,
+        skin: wp.array(dtype=wp.float64),
         starting: wp.array(dtype=int),
         carried_off: wp.array(dtype=wp.float64),
         grains_moved: wp.array(dtype=int),
         fault: wp.array(dtype=int),
     ):
-        for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+        for k in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            i = sure(k)
             here = place[i]
             if here[3] == whole(0):
                 continue
@@ -236,7 +161,7 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
             place[i] = whole4(x, y, z, here[3])
             start = origin[i]
             moved = vec3(real(x - start[0]), real(y - start[1]), real(z - start[2]))
-            if wp.dot(moved, moved) > half_skin * half_skin:
+            if real(4.0) * wp.dot(moved, moved) > real(skin[0] * skin[0]):
                 grains_moved[0] = 1
 
     return move_grains
@@ -286,7 +211,8 @@ def build_complete_step(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
         seen_motion: wp.array(dtype=vec4),
         seen_spin: wp.array(dtype=vec3),
     ):
-        for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+        for k in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            i = sure(k)
             here = place[i]
             seen = motion[i]
             turning = vec3(real(0.0))

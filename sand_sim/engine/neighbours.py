@@ -9,7 +9,7 @@ from sand_sim.engine.act import build_swapped
 from sand_sim.engine.cells import cell_functions, level_type
 from sand_sim.engine.contact_list import listed_at
 from sand_sim.engine.count import share_out
-from sand_sim.engine.kernel import kernel
+from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.recipe import Recipe
 
 
@@ -47,7 +47,8 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         levels: wp.array(dtype=level),
         lowest: wp.array(dtype=whole3),
         cell_starts: wp.array(dtype=int),
-        skin: real,
+        skin: wp.array(dtype=wp.float64),
+        across: real,
         member: wp.array(dtype=int),
         body_of: wp.array(dtype=int),
         counts: wp.array(dtype=int),
@@ -60,12 +61,17 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         old_partner: wp.array(dtype=int),
         old_memory: wp.array(dtype=memory_vector),
     ):
-        for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+        for item in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            i = sure(item)
             here = place[i]
             low = lowest[0]
+            gap = real(skin[0]) + across
             found = int(0)
             if wp.static(filling):
                 found = starts[i]
+            came = i
+            if wp.static(filling and history):
+                came = sure(came_from[i])
             own = level_of(levels, here[3])
             for k in range(own, levels.shape[0]):
                 one = levels[k]
@@ -78,16 +84,17 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                     behind = k == own and row < 4
                     if behind or y < 0 or y >= one.ny or z < 0 or z >= one.nz:
                         continue
-                    line = one.first_key + (z * one.ny + y) * one.nx
-                    first = cell_starts[line + left]
+                    line = sure(one.first_key + (z * one.ny + y) * one.nx)
+                    first = cell_starts[sure(line + left)]
                     if k == own and row == 4:
                         first = i + 1
-                    for j in range(first, cell_starts[line + right + 1]):
+                    for other in range(first, cell_starts[sure(line + right + 1)]):
+                        j = sure(other)
                         there = place[j]
                         dx = real(here[0] - there[0])
                         dy = real(here[1] - there[1])
                         dz = real(here[2] - there[2])
-                        reach = real(here[3] + there[3]) + skin
+                        reach = real(here[3] + there[3]) + gap
                         if dx * dx + dy * dy + dz * dz < reach * reach:
                             apart = bool(True)
                             if wp.static(bodies):
@@ -95,18 +102,20 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                             if not apart:
                                 continue
                             if wp.static(filling):
-                                owner[found] = i
-                                partner[found] = j
+                                at = sure(found)
+                                owner[at] = i
+                                partner[at] = j
                                 if wp.static(history):
                                     kept = memory_vector()
-                                    old = listed_at(old_starts, old_partner, came_from[i], came_from[j])
+                                    was = sure(came_from[j])
+                                    old = listed_at(old_starts, old_partner, came, was)
                                     if old >= 0:
-                                        kept = old_memory[old]
+                                        kept = old_memory[sure(old)]
                                     else:
-                                        old = listed_at(old_starts, old_partner, came_from[j], came_from[i])
+                                        old = listed_at(old_starts, old_partner, was, came)
                                         if old >= 0:
-                                            kept = swapped(old_memory[old])
-                                    memory[found] = kept
+                                            kept = swapped(old_memory[sure(old)])
+                                    memory[at] = kept
                             found += 1
             if wp.static(not filling):
                 counts[i] = found

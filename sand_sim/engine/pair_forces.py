@@ -6,7 +6,7 @@ import warp as wp
 
 from sand_sim.contact.response import build_drifting, build_meeting, memory_type
 from sand_sim.engine.act import build_act, build_acts
-from sand_sim.engine.kernel import kernel
+from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.recipe import Recipe
 from sand_sim.precision import Precision
 
@@ -91,9 +91,10 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
         deepest: wp.array(dtype=real),
         energy: wp.array(dtype=real),
     ):
-        for contact in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
-            a = owner[contact]
-            b = partner[contact]
+        for listed in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            contact = sure(listed)
+            a = sure(owner[contact])
+            b = sure(partner[contact])
             at_a = place[a]
             at_b = place[b]
             excess = excess_of(at_a, at_b)

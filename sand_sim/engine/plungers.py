@@ -104,12 +104,12 @@ def advance_plungers(
     engaged: wp.array(dtype=int),
     dt: wp.float64,
     inverse_quantum: wp.float64,
-    allowance: wp.float64,
+    skin: wp.array(dtype=wp.float64),
     moved: wp.array(dtype=int),
 ):
     """Sum the forces and move all plungers by one step, as the grains: ``w += a dt``, ``x += w dt``, ``v = w + a dt/2``.
 
-    Raises the flag ``moved`` if one has moved farther than ``allowance`` [m] since the contact lists were made.
+    Raises the flag ``moved`` if one has moved farther than half the skin [quantum] since the contact lists were made.
     """
     plungers = drives.shape[0]
     pairs = pair_spans[pair_spans.shape[0] - 1]
@@ -136,7 +136,7 @@ def advance_plungers(
             state.offset = reached
             state.shift = reached * inverse_quantum
             state.travelled = state.travelled + wp.abs(step)
-            if state.travelled > allowance:
+            if state.travelled * inverse_quantum > wp.float64(0.5) * skin[0]:
                 moved[0] = 1
         states[k] = state
 

@@ -10,6 +10,7 @@ from sand_sim.engine import body_motion, finish, motion, neighbours, pair_forces
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_lay_cells
 from sand_sim.engine.contact_list import ContactList, record_count, record_fill
+from sand_sim.engine.skin import adapt_skin, narrow_skin
 from sand_sim.engine.sorting import record_sort
 
 
@@ -105,16 +106,17 @@ def sort_stage(arrays: DemArrays, recorder) -> None:
 def list_stage(arrays: DemArrays, recorder) -> None:
     """Find what each grain may touch among grains and walls; count first, so that nothing is written unless all of it fits."""
     grains, flags, cells = arrays.grains, arrays.flags, arrays.cells
-    active, gap, quantum = grains.active, arrays.setting.listing_gap, arrays.lattice.quantum
+    active, skin, across = grains.active, arrays.skin, arrays.setting.reach / arrays.lattice.quantum
 
     def pairs(filling):
-        inputs = [grains.place, cells.levels, cells.low, arrays.in_cells.starts, gap / quantum]
+        inputs = [grains.place, cells.levels, cells.low, arrays.in_cells.starts, skin.width, across]
         inputs += [grains.member, arrays.bodies.body_of if arrays.bodies else None]
         inputs += _list_arguments(arrays, arrays.pair_list)
         recorder.each(neighbours.build_search(arrays.recipe, filling), active, inputs)
 
     def walls(filling):
-        inputs = [grains.place, arrays.walls, arrays.plunger_states, gap / quantum, *_list_arguments(arrays, arrays.wall_list)]
+        inputs = [grains.place, arrays.walls, arrays.plunger_states, skin.width, across]
+        inputs += _list_arguments(arrays, arrays.wall_list)
         recorder.each(surface_contacts.build_surface_search(arrays.recipe, filling), active, inputs)
 
     def fill():
@@ -131,6 +133,8 @@ def list_stage(arrays: DemArrays, recorder) -> None:
             recorder.once(plungers.forget_plunger_travel, [arrays.plungers.states], wait=False)
         recorder.once(finish.lower_flag, [flags.grains_moved])
 
+    if skin.radius:
+        recorder.once(adapt_skin, [skin.radius, skin.widest, flags.steps_done, skin.width, skin.renewed_at])
     record_count(recorder, arrays.pair_list, active, partial(pairs, False), flags)
     if arrays.walls:
         record_count(recorder, arrays.wall_list, active, partial(walls, False), flags)
@@ -143,7 +147,7 @@ def tool_list_stage(arrays: DemArrays, recorder) -> None:
 
     def search(filling):
         inputs = [grains.origin, tools.shapes, tools.states, tools.cell_starts, tools.particles]
-        inputs += [arrays.lattice.quantum, arrays.setting.listing_gap, *_list_arguments(arrays, arrays.tool_list)]
+        inputs += [arrays.lattice.quantum, arrays.skin.width, arrays.setting.reach, *_list_arguments(arrays, arrays.tool_list)]
         recorder.each(tool_contacts.build_tool_search(arrays.recipe, filling), grains.active, inputs)
 
     def fill():
@@ -210,7 +214,7 @@ def move_stage(arrays: DemArrays, recorder) -> None:
             lattice.quantum,
             precision.whole3(*lattice.half_extent.tolist()),
             lattice.end,
-            0.5 * setting.skin / lattice.quantum,
+            arrays.skin.width,
             arrays.flags.starting,
             arrays.carried_off,
             arrays.flags.grains_moved,
@@ -228,21 +232,24 @@ def body_stage(arrays: DemArrays, recorder) -> None:
     inputs += [grains.place, grains.motion, grains.spin, grains.half_motion, grains.half_spin, grains.origin]
     inputs += [arrays.felt_force, arrays.felt_torque]
     inputs += [precision.vec3(*setting.gravity), setting.dt, lattice.quantum]
-    inputs += [precision.whole3(*lattice.half_extent.tolist()), lattice.end, 0.5 * setting.skin / lattice.quantum]
+    inputs += [precision.whole3(*lattice.half_extent.tolist()), lattice.end, arrays.skin.width]
     inputs += [flags.starting, arrays.carried_off, flags.grains_moved, flags.fault]
     recorder.each(body_motion.build_move_bodies(arrays.recipe), bodies.count, inputs)
 
 
 def finish_stage(arrays: DemArrays, recorder) -> None:
     """Sum the wrenches, move the plungers on, count the step, move the tools on."""
-    flags, tools, dt = arrays.flags, arrays.tools, arrays.setting.dt
+    flags, skin, tools, dt = arrays.flags, arrays.skin, arrays.tools, arrays.setting.dt
+    if skin.radius:
+        watched = [skin.radius, skin.widest, flags.steps_done, skin.width, skin.renewed_at, flags.grains_moved]
+        recorder.once(narrow_skin, watched, wait=False)
     if tools:
         recorder.once(finish.sum_wrenches, [arrays.tool_list.pairs.spans, arrays.wrench_blocks, tools.wrench], wait=False)
         inputs = [dt, tools.tracks, flags.steps_done, tools.wrench, tools.impulse, tools.work]
         recorder.once(finish.sum_impulses, inputs, wait=False)
     if arrays.plungers:
         moved = [arrays.wall_list.pairs.spans, arrays.plunger_blocks, arrays.plungers.drives, arrays.plungers.states]
-        moved += [arrays.plungers.engaged, dt, 1.0 / arrays.lattice.quantum, 0.5 * arrays.setting.skin, flags.grains_moved]
+        moved += [arrays.plungers.engaged, dt, 1.0 / arrays.lattice.quantum, arrays.skin.width, flags.grains_moved]
         recorder.once(plungers.advance_plungers, moved, wait=False)
     ending = [flags.steps_done, flags.steps_left, flags.starting, flags.fault, flags.running]
     recorder.once(finish.finish_step, ending, wait=not tools)
@@ -265,7 +272,7 @@ def place_tools(arrays: DemArrays, recorder) -> None:
             setting.dt,
             arrays.flags.steps_done,
             tools.travelled,
-            0.5 * setting.skin,
+            arrays.skin.width,
             arrays.flags.tools_moved,
         ],
     )

@@ -72,7 +72,8 @@ def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         place: wp.array(dtype=whole4),
         walls: wp.array(dtype=Surface),
         plungers: wp.array(dtype=PlungerState),
-        gap: wp.float64,
+        skin: wp.array(dtype=wp.float64),
+        across: wp.float64,
         counts: wp.array(dtype=int),
         starts: wp.array(dtype=int),
         owner: wp.array(dtype=int),
@@ -85,6 +86,7 @@ def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
     ):
         for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
             here = place[i]
+            gap = skin[0] + across
             reach = wp.float64(here[3]) + gap
             found = int(0)
             if wp.static(filling):

@@ -57,7 +57,8 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         cell_starts: wp.array(dtype=int),
         particles: wp.array(dtype=vec3),
         quantum: real,
-        skin: real,
+        skin: wp.array(dtype=wp.float64),
+        across: real,
         counts: wp.array(dtype=int),
         starts: wp.array(dtype=int),
         owner: wp.array(dtype=int),
@@ -77,7 +78,7 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                 shape = shapes[tool]
                 state = states[tool]
                 away = from_tool(here, state, quantum)
-                reach = real(here[3]) * quantum + shape.radius + skin
+                reach = (real(here[3]) + real(skin[0])) * quantum + shape.radius + across
                 farthest = shape.extent + reach
                 if wp.dot(away, away) > farthest * farthest:
                     continue
