@@ -131,13 +131,11 @@ def left_out(assembly: Assembly) -> dict[str, str]:
 
 def array_sizes(arrays: DemArrays) -> dict[str, int]:
     """Bytes of all device arrays by name; arrays that share memory count once."""
-    sizes, seen = {}, set()
+    found = {}
 
     def walk(name: str, value) -> None:
         if isinstance(value, wp.array):
-            if value.ptr and value.ptr not in seen:
-                seen.add(value.ptr)
-                sizes[name] = value.capacity
+            found[name] = value
         elif isinstance(value, dict):
             for key, entry in value.items():
                 walk(f"{name}.{getattr(key, '__name__', key)}", entry)
@@ -146,6 +144,10 @@ def array_sizes(arrays: DemArrays) -> dict[str, int]:
                 walk(f"{name}.{key}".lstrip("."), entry)
 
     walk("", arrays)
+    sizes, end = {}, 0
+    for name, array in sorted(found.items(), key=lambda item: (item[1].ptr or 0, -item[1].capacity)):
+        if array.ptr and array.ptr + array.capacity > end:
+            sizes[name], end = array.capacity, array.ptr + array.capacity
     return sizes
 
 

@@ -1,13 +1,14 @@
 """All arrays of an explicit DEM world, and only those that its scene needs."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import warp as wp
 
 from sand_sim.engine import energy, tool_contacts
 from sand_sim.engine.bodies import Bodies
+from sand_sim.engine.borrowing import Lender
 from sand_sim.engine.cells import prepare_cells
 from sand_sim.engine.contact_list import ContactList
 from sand_sim.engine.count import Count
@@ -23,8 +24,9 @@ from sand_sim.engine.tool_body import ToolBody, Tools
 from sand_sim.grain_table import GrainTable
 from sand_sim.integrator import VERLET
 
-_ROOM_TO_SPARE = 1.25
-_FIRST_PAIRS = 5  # room for contacts per grain to begin with
+_ROOM_TO_SPARE = 1.1
+_FIRST_PAIRS = 3  # room for contacts per grain to begin with
+_FIRST_OTHERS = 0.25  # the same at walls and at tools
 
 
 @dataclass(frozen=True)
@@ -98,9 +100,10 @@ class DemArrays:
         self.fastest = wp.zeros(lanes, dtype=precision.real, device=device)
 
         self.cells = prepare_cells(table.radius, setting.listing_gap, lattice, lanes, device)
-        self.in_cells = SortedItems.allocate(self.cells.room, number, lanes, device)
-        self.keys = wp.zeros(number, dtype=int, device=device)
-        self.spare = {array.dtype: wp.zeros_like(array) for array in self.grains.sorted_arrays}
+        self.in_cells = SortedItems.allocate(self.cells.room, 0, lanes, device)
+        own = {array.dtype: wp.zeros_like(array) for array in (self.grains.motion, self.grains.remainder)}
+        others = {array.dtype for array in self.grains.sorted_arrays} - set(own)
+        self.spare = own | {dtype: Lender([own[precision.vec4]], device).lend(dtype, number) for dtype in others}
         # What an observer sees lies in scratch that is idle between neighbour searches.
         self.seen_motion, self.seen_spin = self.grains.motion, self.grains.spin
         if recipe.integrator == VERLET:
@@ -112,12 +115,12 @@ class DemArrays:
 
         self.pair_list = self._contact_list(_FIRST_PAIRS * number)
         self.walls = wp.array(walls, dtype=Surface, device=device) if walls else None
-        self.wall_list = self._contact_list(number) if walls else None
+        self.wall_list = self._contact_list(max(int(_FIRST_OTHERS * number), 64)) if walls else None
         self.plungers = Plungers(list(drives), device) if drives else None
         self.plunger_states = self.plungers.states if drives else None
         farthest = float(table.radius.max()) + setting.listing_gap
         self.tools = Tools(bodies, farthest, precision, device) if bodies else None
-        self.tool_list = self._contact_list(max(number // 4, 64)) if bodies else None
+        self.tool_list = self._contact_list(max(int(_FIRST_OTHERS * number), 64)) if bodies else None
         self.grain_blocks = wp.zeros(energy.blocks_for(number), dtype=wp.vec3d, device=device)
         self.make_room()
 
@@ -136,9 +139,16 @@ class DemArrays:
         if self.met.order.shape[0] != self.pair_list.pairs.capacity:  # else it holds what a pair list still in use needs
             self.met = SortedItems.allocate(self.grains.capacity, self.pair_list.pairs.capacity, self.lanes, self.device)
         precision = self.recipe.precision
+        # Nobody looks at old lists or at forces while the others are in use.
         self.energy = {
-            name: wp.zeros(c.pairs.capacity, dtype=precision.real, device=self.device) for name, c in self.lists.items()
+            name: Lender([c.old_partner], self.device).lend(precision.real, c.pairs.capacity) for name, c in self.lists.items()
         }
+        lender, number = Lender([self.pair_list.couple, self.pair_list.force], self.device), self.grains.capacity
+        counts, old_starts, met_cursor, self.keys, order = (lender.lend(int, number + 1) for _ in range(5))
+        self.in_cells = replace(self.in_cells, order=order, cursor=lender.lend(int, self.cells.room))
+        self.met = replace(self.met, cursor=met_cursor)
+        for contacts in self.lists.values():
+            contacts.counts, contacts.old_starts, contacts.new_starts = counts, old_starts, lender.lend(int, number + 1)
         self.energy_blocks = {
             name: wp.zeros(energy.blocks_for(c.pairs.capacity), dtype=wp.vec2d, device=self.device)
             for name, c in self.lists.items()

@@ -13,7 +13,7 @@ from sand_sim.engine.kernel import kernel
 from sand_sim.engine.lattice import Lattice
 from sand_sim.precision import Precision
 
-_CELLS_PER_GRAIN = 8
+_CELLS_PER_GRAIN = 4
 _FEWEST_CELLS = 4096
 _SIZE_CLASS = 2.0  # radii within a level differ by about this factor
 

@@ -30,13 +30,14 @@ class ContactList:
         memory: what the contact laws remember, shape (room,); None without history.
         drawer: memory of the last list while a new one is made; None without history.
         wanted: contacts found by the last search, int, shape (1,).
+        counts, new_starts, old_starts: scratch while lists are made, int, shape (grains + 1,); given by ``DemArrays``.
     """
 
     def __init__(self, room: int, grains: int, recipe: Recipe, lanes: int, device: str):
         self.recipe, self.device = recipe, device
         self.pairs = Count(0, lanes, device)
-        self.counts, self.totals = wp.zeros(grains, dtype=int, device=device), wp.zeros(lanes, dtype=int, device=device)
-        self.starts, self.new_starts, self.old_starts = (wp.zeros(grains + 1, dtype=int, device=device) for _ in range(3))
+        self.totals, self.starts = wp.zeros(lanes, dtype=int, device=device), wp.zeros(grains + 1, dtype=int, device=device)
+        self.counts = self.new_starts = self.old_starts = None
         self.wanted = wp.zeros(1, dtype=int, device=device)
         self.partner = self.memory = None
         self.make_room(room)

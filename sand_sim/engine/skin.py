@@ -11,7 +11,7 @@ import warp as wp
 from sand_sim.engine.kernel import kernel
 
 _SEARCH = 5.0  # measured: benchmarks/profile.py
-_NARROWEST = 0.1  # of the widest skin
+_NARROWEST, _FIRST = 0.1, 0.4  # of the widest skin
 _TOO_LONG = 4.0  # a list that has lasted this many times as long as it should has a skin at least twice as wide as it should
 
 
@@ -27,7 +27,7 @@ class Skin:
 
     def __init__(self, widest: float, radius: float, device: str):
         self.widest, self.radius = widest, radius
-        self.width = wp.full(1, widest, dtype=wp.float64, device=device)
+        self.width = wp.full(1, _FIRST * widest if radius else widest, dtype=wp.float64, device=device)
         self.renewed_at = wp.zeros(1, dtype=wp.int64, device=device)
 
 
