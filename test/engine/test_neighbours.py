@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scenes import floor
 
 
 def cloud(number, radius, edge, seed):
@@ -84,3 +85,47 @@ def test_grains_that_leave_are_counted_and_retired(make_world):
     observation = world.observe()
     assert observation.health.retired == 60 - len(observation.grains)
     assert np.array_equal(np.unique(observation.grains.identity), observation.grains.identity)
+
+
+def untouched(world):
+    """Pairs that overlap but are not on the list."""
+    grains = world.observe().grains
+    found = {tuple(pair) for pair in listed_pairs(world)[0]}
+    distance = np.linalg.norm(grains.position[:, None] - grains.position[None], axis=2)
+    a, b = np.nonzero(np.triu(distance < grains.radius[:, None] + grains.radius[None] - 1e-9, k=1))
+    return {tuple(pair) for pair in np.column_stack([grains.identity[a], grains.identity[b]])} - found
+
+
+def test_skin_follows_the_motion(make_world):
+    """It narrows where grains hardly move, widens where they do, and no contact is missed on the way."""
+    position, radius = cloud(300, SIZES["one size"], 0.05, seed=4)
+    random = np.random.default_rng(5)
+    stir = {"gravity": [0.0, 0.0, -9.81], "boundaries": floor(), "time_step": 1e-5, "friction": 0.3}
+    still = make_world([[0.0, 0.0, 0.003], [0.1, 0.0, 0.003]], 0.003, **stir | {"boundaries": floor(1e-9)})
+    still.step(3000)
+    moving = make_world(position, radius, velocity=random.normal(0.0, 1.0, position.shape), **stir)
+    for _ in range(20):
+        moving.step(40)
+        assert untouched(moving) == set()
+
+    def share(world):
+        skin = world.assembly.solver.arrays.skin
+        return float(skin.width.numpy()[0]) / skin.widest
+
+    assert share(still) < 0.25
+    assert share(moving) > 0.5
+    own = make_world(position, radius, skin=2e-4)
+    own.step(50)
+    assert share(own) == 1.0, "a skin of the scene's own stays as it is"
+
+
+def test_a_saved_world_goes_on_with_its_skin(make_world):
+    position, radius = cloud(200, SIZES["one size"], 0.04, seed=6)
+    world = make_world(position, radius, precision="single", time_step=1e-5)
+    world.step(37)
+    state = world.save()
+    world.step(200)
+    after = world.observe().grains.position
+    world.restore(state)
+    world.step(200)
+    assert np.array_equal(after, world.observe().grains.position)
