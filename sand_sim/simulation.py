@@ -64,7 +64,6 @@ class Simulation:
         self._courses = {tool.name: deque() for tool in world.scene.tools}
         self._last_command: dict[str, float] = {}
         self._promised: dict[str, float] = {}
-        self._frames_granted = 0
         self._paused = self._stopping = False
         self._due = (0.0, 0.0)
         self._frame_end = world.time + self.frame

@@ -14,14 +14,12 @@ class Ask:
     Attributes:
         unit: shown when a value is refused.
         above, least, most: range.
-        default: None if it must be given.
     """
 
     unit: str = ""
     above: float = -inf
     least: float = -inf
     most: float = inf
-    default: float | None = None
 
 
 ASKS = {

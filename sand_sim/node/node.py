@@ -72,7 +72,7 @@ class SandSimNode(Node):
             world, _path(settings["recording"]), _path(settings["output"]), settings["view"], settings["particles"]
         )
         self.done = False
-        self._next_points, self._told, self._diagnosed = 0.0, time.monotonic(), 0.0
+        self._next_points, self._told = 0.0, time.monotonic()
         self._last: Observation | None = None
         self.simulation = Simulation(
             world,
