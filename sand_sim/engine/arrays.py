@@ -62,8 +62,7 @@ class DemArrays:
         walls: ``Surface`` structs.
         bodies: tools.
         pairs: ``MaterialPair`` structs, one row per material.
-        lanes: of the device.
-        device: Warp device.
+        on: the device, from ``device.open_device``.
         drives: ``Plunger`` structs of the walls that move, in their order.
     """
 
@@ -76,11 +75,12 @@ class DemArrays:
         walls: list,
         bodies: list[ToolBody],
         pairs: list,
-        lanes: int,
-        device: str,
+        on,
         drives: Sequence = (),
     ):
-        self.recipe, self.setting, self.lattice, self.lanes, self.device = recipe, setting, lattice, lanes, device
+        self.recipe, self.setting, self.lattice, self.on = recipe, setting, lattice, on
+        self.device = device = on.name
+        lanes, shares = on.lanes, on.shares
         precision, number = recipe.precision, len(table)
         self.flags = Flags(device)
         self.skin = Skin(setting.skin / lattice.quantum, setting.radius / lattice.quantum, device)
@@ -95,10 +95,10 @@ class DemArrays:
         self.pairs = wp.array(rows, dtype=recipe.contact.types(precision).pair, device=device)
         self.deepest = wp.zeros(lanes, dtype=precision.real, device=device)
         self.carried_off = wp.zeros(lanes, dtype=wp.float64, device=device)
-        self.fastest = wp.zeros(lanes, dtype=precision.real, device=device)
+        self.fastest = wp.zeros(shares, dtype=precision.real, device=device)
 
-        self.cells = prepare_cells(table.radius, setting.listing_gap, lattice, lanes, device)
-        self.in_cells = SortedItems.allocate(self.cells.room, number, lanes, device)
+        self.cells = prepare_cells(table.radius, setting.listing_gap, lattice, on)
+        self.in_cells = SortedItems.allocate(self.cells.bins.capacity, number, on)
         self.keys = wp.zeros(number, dtype=int, device=device)
         self.spare = {array.dtype: wp.zeros_like(array) for array in self.grains.sorted_arrays}
         # What an observer sees lies in scratch that is idle between neighbour searches.
@@ -108,7 +108,7 @@ class DemArrays:
             self.seen_spin = self.spare[precision.vec3] if recipe.rotation else None
         self.every_start = Count(number + 1, lanes, device)
         self.every_start.set(number + 1)
-        self.met = SortedItems.allocate(number, 0, lanes, device)
+        self.met = SortedItems.allocate(number, 0, on)
 
         self.pair_list = self._contact_list(_FIRST_PAIRS * number)
         self.walls = wp.array(walls, dtype=Surface, device=device) if walls else None
@@ -134,7 +134,7 @@ class DemArrays:
             if wanted > contacts.pairs.capacity:
                 contacts.make_room(int(_ROOM_TO_SPARE * wanted))
         if self.met.order.shape[0] != self.pair_list.pairs.capacity:  # else it holds what a pair list still in use needs
-            self.met = SortedItems.allocate(self.grains.capacity, self.pair_list.pairs.capacity, self.lanes, self.device)
+            self.met = SortedItems.allocate(self.grains.capacity, self.pair_list.pairs.capacity, self.on)
         precision = self.recipe.precision
         self.energy = {
             name: wp.zeros(c.pairs.capacity, dtype=precision.real, device=self.device) for name, c in self.lists.items()
@@ -153,4 +153,4 @@ class DemArrays:
             self.wrench_blocks = wp.zeros((blocks * self.tools.number, 2), dtype=wp.vec3d, device=self.device)
 
     def _contact_list(self, room: int) -> ContactList:
-        return ContactList(room, self.grains.capacity, self.recipe, self.lanes, self.device)
+        return ContactList(room, self.grains.capacity, self.recipe, self.on)

@@ -60,7 +60,14 @@ def available_cores() -> int:
 
 
 class LaneRecorder:
-    """What a stage records itself on; this one keeps the share of one lane."""
+    """What a stage records itself on; this one keeps the share of one lane.
+
+    Attributes:
+        lanes: how many there are.
+        wide: whether many threads work on one lane; here each has its own.
+    """
+
+    wide = False
 
     def __init__(self, device: "CpuDevice", lane: int):
         self._device, self._lane = device, lane
@@ -82,7 +89,10 @@ class LaneRecorder:
             self.wait()
 
     def share(self, launched: wp.Kernel, inputs: list, wait: bool = True) -> None:
-        """Launch one thread a lane; the kernel takes ``(lane, lanes, *inputs)`` and finds its own share."""
+        """Launch one thread a share, here a lane.
+
+        The kernel takes ``(lane, shares, *inputs)`` and finds what share ``lane + wp.tid()`` has to do.
+        """
         self._launch(launched, 1, [self._lane, self.lanes, *inputs])
         if wait:
             self.wait()
@@ -115,9 +125,11 @@ class CpuDevice:
     """All cores of this machine as one device."""
 
     name = "cpu"
+    wide = False
 
     def __init__(self, threads: int | None = None):
-        self.lanes = threads or available_cores()
+        self.lanes = self.shares = threads or available_cores()
+        self.label = f"cpu, {self.lanes} threads"
         give_way = ctypes.cast(ctypes.CDLL(None).sched_yield, ctypes.c_void_p).value
         self._meeting = wp.zeros(48, dtype=int, device="cpu")
         self.meeting_arguments = [self._meeting, self.lanes, _SPINS_BEFORE_YIELD, wp.uint64(give_way)]
