@@ -22,13 +22,7 @@ from sand_sim.precision import PRECISIONS
 CONFIG = Path(__file__).parents[2] / "config"
 SCENES = [path.stem for path in sorted(CONFIG.glob("*.yaml"))]
 ARCHITECTURES = (80, 90)
-ALL = {
-    recipe.PLANE,
-    recipe.CYLINDER,
-    recipe.SHELL,
-    recipe.ROUGH,
-    recipe.PLUNGER,
-}
+ALL = (recipe.PLANE, recipe.CYLINDER, recipe.SHELL, recipe.ROUGH, recipe.PLUNGER)
 
 
 def compile_all(kernels, architectures, folder):
