@@ -7,13 +7,13 @@ threads take in strides, and shares of what has to be walked through in order ar
 Every item and every sum is computed by the same code in the same order as on a CPU; what differs is how the compilers round.
 """
 
-import os
 from collections.abc import Callable
 
 import warp as wp
 
 from sand_sim.engine.count import Count
 from sand_sim.engine.kernel import fill_gaps
+from sand_sim.engine.lanes import RECORDING, available_cores
 from sand_sim.engine.survey import Survey
 
 _SHARES = 4096  # sums over all shares are serial, walks through one share too; for a million items this balances them
@@ -107,8 +107,8 @@ class CudaDevice:
         survey = Survey(self)
         program(survey)
         modules = list({kernel.module for kernel in survey.kernels.values()})
-        wp.force_load(self.name, modules, block_dim=_BLOCK, max_workers=os.cpu_count())
-        with wp.ScopedCapture(device=self.name) as capture:
+        wp.force_load(self.name, modules, block_dim=_BLOCK, max_workers=available_cores())
+        with RECORDING, wp.ScopedCapture(device=self.name) as capture:
             program(CudaRecorder(self))
         return lambda: wp.capture_launch(capture.graph)
 

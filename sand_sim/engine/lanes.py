@@ -18,7 +18,7 @@ from sand_sim.engine.kernel import fill_gaps, kernel
 
 _SPINS_BEFORE_YIELD = 2000
 _ABANDONED = 32
-_recording = threading.Lock()  # Warp records the launches of the whole process while a capture is open
+RECORDING = threading.Lock()  # Warp records the launches of the whole process while a capture is open
 
 _BARRIER = """
 #if !defined(__CUDA_ARCH__)
@@ -146,7 +146,7 @@ class CpuDevice:
         """
         graphs = []
         for lane in range(self.lanes):
-            with _recording, wp.ScopedCapture(device="cpu") as capture:
+            with RECORDING, wp.ScopedCapture(device="cpu") as capture:
                 program(LaneRecorder(self, lane))
             graphs.append(capture.graph)
         return lambda: self._run(graphs)
