@@ -35,6 +35,7 @@ def time_stages(world, cycles: int) -> dict[str, np.ndarray]:
             arrays.flags.proceed.fill_(1)
             begin = time.perf_counter()
             program()
+            device.synchronize()
             spent[key].append((time.perf_counter() - begin) / PLAYS[key[0]])
         world.restore(state)
     return {key: np.array(times) for key, times in spent.items()}

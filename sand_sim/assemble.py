@@ -151,8 +151,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         [ToolBody(tool.body.points, tool.body.radius, order.index(tool.tool.material)) for tool in tools]
         + [ToolBody(ground.body.points, ground.body.radius, order.index(ground.material)) for ground in grounds],
         pairs,
-        device.lanes,
-        device.name,
+        device,
         make_plungers(walls, float(table.mass[table.lone].sum() + table.bodies.mass.sum())),
     )
     numbers, solver = [fill.grains for fill in fills], ExplicitDem(arrays, device)

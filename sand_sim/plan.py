@@ -13,6 +13,7 @@ from sand_sim.engine.lattice import Lattice
 from sand_sim.engine.measuring import record_measurement
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.stages import record_run
+from sand_sim.engine.survey import Survey
 from sand_sim.grain_table import GrainTable
 from sand_sim.integrator import VERLET
 from sand_sim.scene.clumps import place_clumps
@@ -53,29 +54,6 @@ class Plan:
     duration: float | None
 
 
-class _Listing:
-    """A recorder that only notes which kernels are launched."""
-
-    def __init__(self, lanes: int):
-        self.lanes, self.kernels = lanes, {}
-
-    def each(self, launched, over, inputs, wait=True):
-        self.kernels[launched.key] = None
-
-    def share(self, launched, inputs, wait=True):
-        self.kernels[launched.key] = None
-
-    once = share
-
-    def when(self, flag, body):
-        body()
-
-    repeat = when
-
-    def wait(self):
-        """Lanes are of no interest here."""
-
-
 def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
     """Plan a scene.
 
@@ -84,9 +62,9 @@ def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
         measure: run a packed sample of grains for a moment to predict the cost.
     """
     arrays, scene, solver = assembly.solver.arrays, assembly.scene, assembly.solver
-    listing = _Listing(arrays.lanes)
-    record_run(arrays, solver.stages, listing)
-    record_measurement(arrays, solver.stages, listing)
+    survey = Survey(solver.device)
+    record_run(arrays, solver.stages, survey)
+    record_measurement(arrays, solver.stages, survey)
     sizes = array_sizes(arrays)
     steps = round(scene.duration / assembly.time_step.value)
     spheres = len(assembly.table)
@@ -100,7 +78,7 @@ def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
         spheres=spheres,
         kept=kept,
         left_out=left_out(assembly),
-        kernels=sorted(name.rsplit("__", 1)[-1] for name in listing.kernels),
+        kernels=sorted(name.rsplit("__", 1)[-1] for name in {kernel.key for kernel in survey.kernels.values()}),
         arrays=sizes,
         bytes_per_sphere=sum(sizes.values()) / spheres,
         time_step=asdict(assembly.time_step),
@@ -141,7 +119,8 @@ def array_sizes(arrays: DemArrays) -> dict[str, int]:
                 walk(f"{name}.{getattr(key, '__name__', key)}", entry)
         elif type(value).__module__.startswith("sand_sim.engine"):
             for key, entry in vars(value).items():
-                walk(f"{name}.{key}".lstrip("."), entry)
+                if key != "on":  # the device has nothing that grows with the scene
+                    walk(f"{name}.{key}".lstrip("."), entry)
 
     walk("", arrays)
     sizes, end = {}, 0
@@ -158,9 +137,7 @@ def measure_cost(assembly: Assembly) -> float:
     setting = assembly.solver.arrays.setting
     recipe: Recipe = replace(assembly.recipe, materials=False)
     device = assembly.solver.device
-    sample = DemArrays(
-        recipe, replace(setting, gravity=np.zeros(3)), lattice, table, [], [], assembly.pair_table, device.lanes, device.name
-    )
+    sample = DemArrays(recipe, replace(setting, gravity=np.zeros(3)), lattice, table, [], [], assembly.pair_table, device)
     solver = ExplicitDem(sample, device)
     solver.run(1)  # compiles
     state, best = solver.take_state(), np.inf

@@ -64,8 +64,7 @@ class DemArrays:
         walls: ``Surface`` structs.
         bodies: tools.
         pairs: ``MaterialPair`` structs, one row per material.
-        lanes: of the device.
-        device: Warp device.
+        on: the device, from ``device.open_device``.
         drives: ``Plunger`` structs of the walls that move, in their order.
     """
 
@@ -78,11 +77,12 @@ class DemArrays:
         walls: list,
         bodies: list[ToolBody],
         pairs: list,
-        lanes: int,
-        device: str,
+        on,
         drives: Sequence = (),
     ):
-        self.recipe, self.setting, self.lattice, self.lanes, self.device = recipe, setting, lattice, lanes, device
+        self.recipe, self.setting, self.lattice, self.on = recipe, setting, lattice, on
+        self.device = device = on.name
+        lanes, shares = on.lanes, on.shares
         precision, number = recipe.precision, len(table)
         self.flags = Flags(device)
         self.skin = Skin(setting.skin / lattice.quantum, setting.radius / lattice.quantum, device)
@@ -97,10 +97,10 @@ class DemArrays:
         self.pairs = wp.array(rows, dtype=recipe.contact.types(precision).pair, device=device)
         self.deepest = wp.zeros(lanes, dtype=precision.real, device=device)
         self.carried_off = wp.zeros(lanes, dtype=wp.float64, device=device)
-        self.fastest = wp.zeros(lanes, dtype=precision.real, device=device)
+        self.fastest = wp.zeros(shares, dtype=precision.real, device=device)
 
-        self.cells = prepare_cells(table.radius, setting.listing_gap, lattice, lanes, device)
-        self.in_cells = SortedItems.allocate(self.cells.room, 0, lanes, device)
+        self.cells = prepare_cells(table.radius, setting.listing_gap, lattice, on)
+        self.in_cells = SortedItems.allocate(self.cells.bins.capacity, 0, on)
         own = {array.dtype: wp.zeros_like(array) for array in (self.grains.motion, self.grains.remainder)}
         others = {array.dtype for array in self.grains.sorted_arrays} - set(own)
         self.spare = own | {dtype: Lender([own[precision.vec4]], device).lend(dtype, number) for dtype in others}
@@ -111,7 +111,7 @@ class DemArrays:
             self.seen_spin = self.spare[precision.vec3] if recipe.rotation else None
         self.every_start = Count(number + 1, lanes, device)
         self.every_start.set(number + 1)
-        self.met = SortedItems.allocate(number, 0, lanes, device)
+        self.met = SortedItems.allocate(number, 0, on)
 
         self.pair_list = self._contact_list(_FIRST_PAIRS * number)
         self.walls = wp.array(walls, dtype=Surface, device=device) if walls else None
@@ -137,7 +137,7 @@ class DemArrays:
             if wanted > contacts.pairs.capacity:
                 contacts.make_room(int(_ROOM_TO_SPARE * wanted))
         if self.met.order.shape[0] != self.pair_list.pairs.capacity:  # else it holds what a pair list still in use needs
-            self.met = SortedItems.allocate(self.grains.capacity, self.pair_list.pairs.capacity, self.lanes, self.device)
+            self.met = SortedItems.allocate(self.grains.capacity, self.pair_list.pairs.capacity, self.on)
         precision = self.recipe.precision
         # Nobody looks at old lists or at forces while the others are in use.
         self.energy = {
@@ -145,7 +145,7 @@ class DemArrays:
         }
         lender, number = Lender([self.pair_list.couple, self.pair_list.force], self.device), self.grains.capacity
         counts, old_starts, met_cursor, self.keys, order = (lender.lend(int, number + 1) for _ in range(5))
-        self.in_cells = replace(self.in_cells, order=order, cursor=lender.lend(int, self.cells.room))
+        self.in_cells = replace(self.in_cells, order=order, cursor=lender.lend(int, self.cells.bins.capacity))
         self.met = replace(self.met, cursor=met_cursor)
         for contacts in self.lists.values():
             contacts.counts, contacts.old_starts, contacts.new_starts = counts, old_starts, lender.lend(int, number + 1)
@@ -163,4 +163,4 @@ class DemArrays:
             self.wrench_blocks = wp.zeros((blocks * self.tools.number, 2), dtype=wp.vec3d, device=self.device)
 
     def _contact_list(self, room: int) -> ContactList:
-        return ContactList(room, self.grains.capacity, self.recipe, self.lanes, self.device)
+        return ContactList(room, self.grains.capacity, self.recipe, self.on)

@@ -131,7 +131,7 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
                 bit = int(wp.static(FAULT_NOT_FINITE))
                 if wp.isfinite(square):
                     bit = int(wp.static(FAULT_TOO_FAST))
-                fault[0] = fault[0] | bit
+                wp.atomic_or(fault, 0, bit)
                 continue
             x = at[0] + whole(jump[0])
             y = at[1] + whole(jump[1])
@@ -164,7 +164,7 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
                 was = place[i]
                 leap = vec3(real(u - was[0]), real(v - was[1]), real(w - was[2]))
                 if wp.dot(leap, leap) > real(0.25) * real(was[3]) * real(was[3]):
-                    fault[0] = fault[0] | wp.static(FAULT_TOO_FAST)
+                    wp.atomic_or(fault, 0, wp.static(FAULT_TOO_FAST))
                 place[i] = whole4(u, v, w, was[3])
                 carried = now + wp.cross(omega, arm)
                 motion[i] = vec4(carried[0], carried[1], carried[2], motion[i][3])

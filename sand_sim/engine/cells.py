@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from sand_sim.engine.count import Count, count_of, share_out, share_start
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.lattice import Lattice
 from sand_sim.precision import Precision
@@ -43,19 +44,17 @@ class Cells:
     Attributes:
         levels: array of ``Level``, shape (levels,).
         low: lower corner of the grid, whole3, shape (1,) [quantum].
-        corners: lower and upper corner of each lane's grains, whole3, shape (lanes, 2) [quantum].
-        bins: number of keys in use, one more than there are cells, int, shape (1,); retired grains get the last.
-        room: most keys.
+        corners: lower and upper corner of each share of the grains, whole3, shape (shares, 2) [quantum].
+        bins: keys in use, one more than there are cells; retired grains get the last.
     """
 
     levels: wp.array
     low: wp.array
     corners: wp.array
-    bins: wp.array
-    room: int
+    bins: Count
 
 
-def prepare_cells(radii: np.ndarray, skin: float, lattice: Lattice, lanes: int, device: str) -> Cells:
+def prepare_cells(radii: np.ndarray, skin: float, lattice: Lattice, on) -> Cells:
     """Choose the levels for spheres of the given radii.
 
     A cell is at least as wide as the reach of its level's largest spheres, so that partners lie in the 27 cells around.
@@ -64,8 +63,7 @@ def prepare_cells(radii: np.ndarray, skin: float, lattice: Lattice, lanes: int, 
         radii: radii of all spheres, shape (n,) [m].
         skin: distance beyond touch at which spheres are listed [m].
         lattice: the domain.
-        lanes: of the device.
-        device: Warp device.
+        on: the device, from ``device.open_device``.
     """
     largest = [float(radii.max())]
     while True:
@@ -81,34 +79,35 @@ def prepare_cells(radii: np.ndarray, skin: float, lattice: Lattice, lanes: int, 
         one.reach = (2.0 * radius + skin) / lattice.quantum * 1.001
         levels.append(one)
     return Cells(
-        levels=wp.array(levels, dtype=level, device=device),
-        low=wp.zeros(1, dtype=whole3, device=device),
-        corners=wp.zeros((lanes, 2), dtype=whole3, device=device),
-        bins=wp.zeros(1, dtype=int, device=device),
-        room=len(levels) * max(_FEWEST_CELLS, _CELLS_PER_GRAIN * len(radii)),
+        levels=wp.array(levels, dtype=level, device=on.name),
+        low=wp.zeros(1, dtype=whole3, device=on.name),
+        corners=wp.zeros((on.shares, 2), dtype=whole3, device=on.name),
+        bins=Count(len(levels) * max(_FEWEST_CELLS, _CELLS_PER_GRAIN * len(radii)), on.lanes, on.name),
     )
 
 
 @cache
 def build_find_corners(precision: Precision) -> wp.Kernel:
-    """Kernel for the bounding box of each lane's grains."""
+    """Kernel for the bounding box of each share of the grains."""
     whole, whole3, whole4 = precision.whole, precision.whole3, precision.whole4
 
     @kernel
     def find_corners(
-        lane: int, lanes: int, spans: wp.array(dtype=int), place: wp.array(dtype=whole4), corners: wp.array2d(dtype=whole3)
+        lane: int, shares: int, spans: wp.array(dtype=int), place: wp.array(dtype=whole4), corners: wp.array2d(dtype=whole3)
     ):
+        own = lane + wp.tid()
+        grains = count_of(spans)
         far = whole(wp.static(2**precision.lattice_bits))
         low = whole3(far, far, far)
         high = -low
-        for i in range(spans[lane], spans[lane + 1]):
+        for i in range(share_start(grains, own, shares), share_start(grains, own + 1, shares)):
             here = place[i]
             if here[3] > whole(0):
                 at = whole3(here[0], here[1], here[2])
                 low = wp.min(low, at)
                 high = wp.max(high, at)
-        corners[lane, 0] = low
-        corners[lane, 1] = high
+        corners[own, 0] = low
+        corners[own, 1] = high
 
     return find_corners
 
@@ -129,9 +128,9 @@ def build_lay_cells(precision: Precision) -> wp.Kernel:
     ):
         lowest = corners[0, 0]
         highest = corners[0, 1]
-        for lane in range(1, corners.shape[0]):
-            lowest = wp.min(lowest, corners[lane, 0])
-            highest = wp.max(highest, corners[lane, 1])
+        for share_of in range(1, corners.shape[0]):
+            lowest = wp.min(lowest, corners[share_of, 0])
+            highest = wp.max(highest, corners[share_of, 1])
         low[0] = lowest
         span_x = wp.max(real(highest[0] - lowest[0]), real(0.0))
         span_y = wp.max(real(highest[1] - lowest[1]), real(0.0))
@@ -152,7 +151,7 @@ def build_lay_cells(precision: Precision) -> wp.Kernel:
             one.first_key = key
             levels[k] = one
             key += one.nx * one.ny * one.nz
-        bins[0] = key + 1
+        share_out(bins, key + 1)
 
     return lay_cells
 
@@ -201,7 +200,7 @@ def build_cell_keys(precision: Precision) -> wp.Kernel:
         for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
             here = place[i]
             if here[3] == whole(0):
-                keys[i] = bins[0] - 1
+                keys[i] = count_of(bins) - 1
             else:
                 one = levels[level_of(levels, here[3])]
                 cell = cell_of(one, low[0], here)

@@ -9,7 +9,7 @@ from functools import cache
 import warp as wp
 
 from sand_sim.contact.response import memory_type
-from sand_sim.engine.count import Count, share_out
+from sand_sim.engine.count import Count, count_of, share_out
 from sand_sim.engine.flags import FAULT_ROOM, Flags
 from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.recipe import Recipe
@@ -33,10 +33,10 @@ class ContactList:
         counts, new_starts, old_starts: scratch while lists are made, int, shape (grains + 1,); given by ``DemArrays``.
     """
 
-    def __init__(self, room: int, grains: int, recipe: Recipe, lanes: int, device: str):
-        self.recipe, self.device = recipe, device
-        self.pairs = Count(0, lanes, device)
-        self.totals, self.starts = wp.zeros(lanes, dtype=int, device=device), wp.zeros(grains + 1, dtype=int, device=device)
+    def __init__(self, room: int, grains: int, recipe: Recipe, on):
+        self.recipe, self.device = recipe, on.name
+        self.pairs, device = Count(0, on.lanes, on.name), on.name
+        self.totals, self.starts = wp.zeros(on.shares, dtype=int, device=device), wp.zeros(grains + 1, dtype=int, device=device)
         self.counts = self.new_starts = self.old_starts = None
         self.wanted = wp.zeros(1, dtype=int, device=device)
         self.partner = self.memory = None
@@ -87,12 +87,12 @@ def check_room(
     fault: wp.array(dtype=int),
 ):
     """Stop before anything is written if the contacts found do not fit; nothing is ever dropped."""
-    number = starts[grain_spans[grain_spans.shape[0] - 1]]
+    number = starts[count_of(grain_spans)]
     wanted[0] = number
     if number > room:
         proceed[0] = 0
         running[0] = 0
-        fault[0] = fault[0] | wp.static(FAULT_ROOM)
+        wp.atomic_or(fault, 0, wp.static(FAULT_ROOM))
 
 
 @kernel

@@ -37,3 +37,17 @@ def share_out(spans: wp.array(dtype=int), number: int):
     share = (share + wp.static(_ALIGNMENT) - 1) // wp.static(_ALIGNMENT) * wp.static(_ALIGNMENT)
     for k in range(lanes + 1):
         spans[k] = wp.min(k * share, number)
+
+
+@wp.func
+def share_start(number: int, own: int, shares: int) -> int:
+    """First item of one of so many equal shares; the same as ``spans`` where there are as many shares as lanes."""
+    share = (wp.max(number, 1) + shares - 1) // shares
+    share = (share + wp.static(_ALIGNMENT) - 1) // wp.static(_ALIGNMENT) * wp.static(_ALIGNMENT)
+    return wp.min(own * share, number)
+
+
+@wp.func
+def count_of(spans: wp.array(dtype=int)) -> int:
+    """Device side of ``Count.get``."""
+    return spans[spans.shape[0] - 1]

@@ -1,9 +1,10 @@
-"""Sums over all grains and contacts, in blocks of fixed size so that they do not depend on the number of lanes."""
+"""Sums over all grains and contacts, in blocks of fixed size so that they do not depend on the number of shares."""
 
 from functools import cache
 
 import warp as wp
 
+from sand_sim.engine.count import count_of
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.recipe import Recipe
 from sand_sim.integrator import VERLET
@@ -27,7 +28,7 @@ def build_grain_energy(recipe: Recipe) -> wp.Kernel:
     @kernel
     def grain_energy(
         lane: int,
-        lanes: int,
+        shares: int,
         spans: wp.array(dtype=int),
         place: wp.array(dtype=whole4),
         motion: wp.array(dtype=vec4),
@@ -39,10 +40,11 @@ def build_grain_energy(recipe: Recipe) -> wp.Kernel:
         blocks: wp.array(dtype=wp.vec3d),
         fastest: wp.array(dtype=real),
     ):
-        grains = spans[spans.shape[0] - 1]
+        own = lane + wp.tid()
+        grains = count_of(spans)
         number = (grains + wp.static(BLOCK) - 1) // wp.static(BLOCK)
         top = real(0.0)
-        for block in range(number * lane // lanes, number * (lane + 1) // lanes):
+        for block in range(number * own // shares, number * (own + 1) // shares):
             total = wp.vec3d(wp.float64(0.0))
             first = block * wp.static(BLOCK)
             for i in range(first, wp.min(first + wp.static(BLOCK), grains)):
@@ -68,7 +70,7 @@ def build_grain_energy(recipe: Recipe) -> wp.Kernel:
                         wp.float64(of_i[3] * height),
                     )
             blocks[block] = total
-        fastest[lane] = wp.sqrt(top)
+        fastest[own] = wp.sqrt(top)
 
     return grain_energy
 
@@ -115,11 +117,12 @@ def build_contact_energy(precision: Precision) -> wp.Kernel:
 
     @kernel
     def contact_energy(
-        lane: int, lanes: int, spans: wp.array(dtype=int), energy: wp.array(dtype=real), blocks: wp.array(dtype=wp.vec2d)
+        lane: int, shares: int, spans: wp.array(dtype=int), energy: wp.array(dtype=real), blocks: wp.array(dtype=wp.vec2d)
     ):
-        contacts = spans[spans.shape[0] - 1]
+        own = lane + wp.tid()
+        contacts = count_of(spans)
         number = (contacts + wp.static(BLOCK) - 1) // wp.static(BLOCK)
-        for block in range(number * lane // lanes, number * (lane + 1) // lanes):
+        for block in range(number * own // shares, number * (own + 1) // shares):
             total = wp.vec2d(wp.float64(0.0))
             first = block * wp.static(BLOCK)
             for contact in range(first, wp.min(first + wp.static(BLOCK), contacts)):

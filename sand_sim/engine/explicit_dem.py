@@ -45,7 +45,7 @@ class ExplicitDem:
 
     Args:
         arrays: state and scratch.
-        device: ``lanes.CpuDevice`` or its like, with as many lanes as the arrays.
+        device: the arrays', from ``device.open_device``.
     """
 
     def __init__(self, arrays: DemArrays, device):

@@ -4,6 +4,7 @@ from functools import cache
 
 import warp as wp
 
+from sand_sim.engine.count import count_of
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.tool_contacts import SUM_BLOCK
 from sand_sim.engine.tools import ToolTrack, build_tool_state_at, tool_types
@@ -50,7 +51,7 @@ def build_place_tools(precision: Precision) -> wp.Kernel:
 def sum_wrenches(pair_spans: wp.array(dtype=int), blocks: wp.array2d(dtype=wp.vec3d), wrench: wp.array2d(dtype=wp.vec3d)):
     """Wrench of the sand on each tool now, shape (tools, 2): force and torque about the tool frame's origin, world frame."""
     tools = wrench.shape[0]
-    pairs = pair_spans[pair_spans.shape[0] - 1]
+    pairs = count_of(pair_spans)
     number = (pairs + wp.static(SUM_BLOCK) - 1) // wp.static(SUM_BLOCK)
     for tool in range(tools):
         force = wp.vec3d(wp.float64(0.0))

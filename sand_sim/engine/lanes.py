@@ -18,7 +18,7 @@ from sand_sim.engine.kernel import fill_gaps, kernel
 
 _SPINS_BEFORE_YIELD = 2000
 _ABANDONED = 32
-_recording = threading.Lock()  # Warp records the launches of the whole process while a capture is open
+RECORDING = threading.Lock()  # Warp records the launches of the whole process while a capture is open
 
 _BARRIER = """
 #if !defined(__CUDA_ARCH__)
@@ -60,7 +60,14 @@ def available_cores() -> int:
 
 
 class LaneRecorder:
-    """What a stage records itself on; this one keeps the share of one lane."""
+    """What a stage records itself on; this one keeps the share of one lane.
+
+    Attributes:
+        lanes: how many there are.
+        wide: whether many threads work on one lane; here each has its own.
+    """
+
+    wide = False
 
     def __init__(self, device: "CpuDevice", lane: int):
         self._device, self._lane = device, lane
@@ -82,7 +89,10 @@ class LaneRecorder:
             self.wait()
 
     def share(self, launched: wp.Kernel, inputs: list, wait: bool = True) -> None:
-        """Launch one thread a lane; the kernel takes ``(lane, lanes, *inputs)`` and finds its own share."""
+        """Launch one thread a share, here a lane.
+
+        The kernel takes ``(lane, shares, *inputs)`` and finds what share ``lane + wp.tid()`` has to do.
+        """
         self._launch(launched, 1, [self._lane, self.lanes, *inputs])
         if wait:
             self.wait()
@@ -115,9 +125,11 @@ class CpuDevice:
     """All cores of this machine as one device."""
 
     name = "cpu"
+    wide = False
 
     def __init__(self, threads: int | None = None):
-        self.lanes = threads or available_cores()
+        self.lanes = self.shares = threads or available_cores()
+        self.label = f"cpu, {self.lanes} threads"
         give_way = ctypes.cast(ctypes.CDLL(None).sched_yield, ctypes.c_void_p).value
         self._meeting = wp.zeros(48, dtype=int, device="cpu")
         self.meeting_arguments = [self._meeting, self.lanes, _SPINS_BEFORE_YIELD, wp.uint64(give_way)]
@@ -134,7 +146,7 @@ class CpuDevice:
         """
         graphs = []
         for lane in range(self.lanes):
-            with _recording, wp.ScopedCapture(device="cpu") as capture:
+            with RECORDING, wp.ScopedCapture(device="cpu") as capture:
                 program(LaneRecorder(self, lane))
             graphs.append(capture.graph)
         return lambda: self._run(graphs)

@@ -144,7 +144,7 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
                 bit = int(wp.static(FAULT_NOT_FINITE))
                 if wp.isfinite(square):
                     bit = int(wp.static(FAULT_TOO_FAST))
-                fault[0] = fault[0] | bit
+                wp.atomic_or(fault, 0, bit)
                 continue
             remainder[i] = step - jump
             x = here[0] + whole(jump[0])

@@ -8,7 +8,7 @@ from sand_sim.contact.response import memory_type
 from sand_sim.engine.act import build_swapped
 from sand_sim.engine.cells import cell_functions, level_type
 from sand_sim.engine.contact_list import listed_at
-from sand_sim.engine.count import share_out
+from sand_sim.engine.count import count_of, share_out
 from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.recipe import Recipe
 
@@ -157,7 +157,7 @@ def build_put_back(dtype: type) -> wp.Kernel:
 @kernel
 def count_active(cell_starts: wp.array(dtype=int), bins: wp.array(dtype=int), spans: wp.array(dtype=int)):
     """Grains sorted behind the last cell have retired."""
-    active = cell_starts[bins[0] - 1]
+    active = cell_starts[count_of(bins) - 1]
     share_out(spans, active)
 
 

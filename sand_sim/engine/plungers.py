@@ -5,11 +5,12 @@ from functools import cache
 import numpy as np
 import warp as wp
 
+from sand_sim.engine.count import count_of
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.surfaces import Surface, build_surface_of
 
-SUM_BLOCK = 128  # contacts per partial sum of a force; fixed, so that the sum does not depend on the number of lanes
+SUM_BLOCK = 128  # contacts per partial sum of a force; fixed, so that the sum does not depend on the number of shares
 
 
 @wp.struct
@@ -70,7 +71,7 @@ def build_plunger_blocks(recipe: Recipe) -> wp.Kernel:
     @kernel
     def plunger_blocks(
         lane: int,
-        lanes: int,
+        shares: int,
         pair_spans: wp.array(dtype=int),
         partner: wp.array(dtype=int),
         force: wp.array(dtype=vec3),
@@ -78,9 +79,10 @@ def build_plunger_blocks(recipe: Recipe) -> wp.Kernel:
         plungers: int,
         blocks: wp.array(dtype=wp.float64),
     ):
-        pairs = pair_spans[pair_spans.shape[0] - 1]
+        own = lane + wp.tid()
+        pairs = count_of(pair_spans)
         number = (pairs + wp.static(SUM_BLOCK) - 1) // wp.static(SUM_BLOCK)
-        for block in range(number * lane // lanes, number * (lane + 1) // lanes):
+        for block in range(number * own // shares, number * (own + 1) // shares):
             for plunger in range(plungers):
                 blocks[block * plungers + plunger] = wp.float64(0.0)
             first = block * wp.static(SUM_BLOCK)
@@ -112,7 +114,7 @@ def advance_plungers(
     Raises the flag ``moved`` if one has moved farther than half the skin [quantum] since the contact lists were made.
     """
     plungers = drives.shape[0]
-    pairs = pair_spans[pair_spans.shape[0] - 1]
+    pairs = count_of(pair_spans)
     number = (pairs + wp.static(SUM_BLOCK) - 1) // wp.static(SUM_BLOCK)
     for k in range(plungers):
         drive = drives[k]

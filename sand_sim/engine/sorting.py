@@ -1,10 +1,14 @@
-"""Two primitives of every list: sort items by a small key, and running totals. Stable, and the same on any number of lanes."""
+"""Two primitives of every list: sort items by a small key, and running totals. Stable, and the same however work is shared out.
+
+Few threads sort best if each owns some keys and looks at all items. On a device of many threads each takes some items: it counts
+keys and takes places atomically, in whatever order, and the items of each key are put in order afterwards.
+"""
 
 from dataclasses import dataclass
 
 import warp as wp
 
-from sand_sim.engine.count import Count
+from sand_sim.engine.count import Count, count_of, share_start
 from sand_sim.engine.kernel import kernel
 
 
@@ -16,7 +20,7 @@ class SortedItems:
         starts: int array, shape (keys + 1,).
         order: int array, shape (item capacity,).
         cursor: int scratch, shape (keys,).
-        totals: int scratch, shape (lanes,).
+        totals: int scratch, shape (shares,).
     """
 
     starts: wp.array
@@ -25,9 +29,9 @@ class SortedItems:
     totals: wp.array
 
     @classmethod
-    def allocate(cls, keys: int, items: int, lanes: int, device: str) -> "SortedItems":
-        """Room for ``items`` items with keys below ``keys``."""
-        return cls(*(wp.zeros(size, dtype=int, device=device) for size in (keys + 1, items, keys, lanes)))
+    def allocate(cls, keys: int, items: int, on) -> "SortedItems":
+        """Room on a device for ``items`` items with keys below ``keys``."""
+        return cls(*(wp.zeros(size, dtype=int, device=on.name) for size in (keys + 1, items, keys, on.shares)))
 
 
 @kernel
@@ -41,13 +45,13 @@ def count_own_keys(
     totals: wp.array(dtype=int),
 ):
     """Each lane owns an interval of keys and counts the items that carry them."""
-    bins = bins_in_use[bins_in_use.shape[0] - 1]
+    bins = count_of(bins_in_use)
     first = int(wp.int64(bins) * wp.int64(lane) // wp.int64(lanes))
     last = int(wp.int64(bins) * wp.int64(lane + 1) // wp.int64(lanes))
     for key in range(first, last):
         counts[key] = 0
     total = int(0)
-    for item in range(spans[lanes]):
+    for item in range(count_of(spans)):
         key = keys[item]
         if key >= first and key < last:
             counts[key] = counts[key] + 1
@@ -68,7 +72,7 @@ def place_own_keys(
     order: wp.array(dtype=int),
 ):
     """Turn the counts of the lane's keys into starts and put their items in order."""
-    bins = bins_in_use[bins_in_use.shape[0] - 1]
+    bins = count_of(bins_in_use)
     first = int(wp.int64(bins) * wp.int64(lane) // wp.int64(lanes))
     last = int(wp.int64(bins) * wp.int64(lane + 1) // wp.int64(lanes))
     start = int(0)
@@ -81,7 +85,7 @@ def place_own_keys(
         start += number
     if lane == lanes - 1:
         starts[bins] = start
-    for item in range(spans[lanes]):
+    for item in range(count_of(spans)):
         key = keys[item]
         if key >= first and key < last:
             order[cursor[key]] = item
@@ -89,47 +93,123 @@ def place_own_keys(
 
 
 @kernel
-def total_share(lane: int, lanes: int, counts: wp.array(dtype=int), spans: wp.array(dtype=int), totals: wp.array(dtype=int)):
-    """Sum of the lane's share of the counts."""
+def clear_counts(lane: int, spans: wp.array(dtype=int), stride: int, counts: wp.array(dtype=int)):
+    """No item has been counted yet."""
+    for key in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+        counts[key] = 0
+
+
+@kernel
+def count_keys(lane: int, spans: wp.array(dtype=int), stride: int, keys: wp.array(dtype=int), counts: wp.array(dtype=int)):
+    """Count the items of each key."""
+    for item in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+        wp.atomic_add(counts, keys[item], 1)
+
+
+@kernel
+def take_places(
+    lane: int,
+    spans: wp.array(dtype=int),
+    stride: int,
+    keys: wp.array(dtype=int),
+    starts: wp.array(dtype=int),
+    counts: wp.array(dtype=int),
+    order: wp.array(dtype=int),
+):
+    """Let each item take the last free place of its key."""
+    for item in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+        key = keys[item]
+        order[starts[key] + wp.atomic_sub(counts, key, 1) - 1] = item
+
+
+@kernel
+def order_places(
+    lane: int,
+    spans: wp.array(dtype=int),
+    stride: int,
+    unordered: int,
+    starts: wp.array(dtype=int),
+    order: wp.array(dtype=int),
+):
+    """Put the items of each key in their old order, by Shell's method; so many keys at the end are left as they are."""
+    for key in range(spans[lane] + wp.tid(), wp.min(spans[lane + 1], count_of(spans) - unordered), stride):
+        first = starts[key]
+        last = starts[key + 1]
+        gap = wp.max((last - first) * 5 // 11, 1)
+        while gap > 0:
+            for i in range(first + gap, last):
+                moving = order[i]
+                to = int(i)
+                searching = bool(True)
+                while searching:
+                    searching = False
+                    if to >= first + gap:
+                        before = order[to - gap]
+                        if before > moving:
+                            order[to] = before
+                            to -= gap
+                            searching = True
+                order[to] = moving
+            if gap == 2:
+                gap = 1
+            else:
+                gap = gap * 5 // 11
+
+
+@kernel
+def total_share(lane: int, shares: int, counts: wp.array(dtype=int), spans: wp.array(dtype=int), totals: wp.array(dtype=int)):
+    """Sum of a share of the counts."""
+    own = lane + wp.tid()
+    items = count_of(spans)
     total = int(0)
-    for item in range(spans[lane], spans[lane + 1]):
+    for item in range(share_start(items, own, shares), share_start(items, own + 1, shares)):
         total += counts[item]
-    totals[lane] = total
+    totals[own] = total
 
 
 @kernel
 def running_totals(
     lane: int,
-    lanes: int,
+    shares: int,
     counts: wp.array(dtype=int),
     spans: wp.array(dtype=int),
     totals: wp.array(dtype=int),
     starts: wp.array(dtype=int),
 ):
     """Exclusive running totals of the counts; one entry more than there are items."""
+    own = lane + wp.tid()
+    items = count_of(spans)
     start = int(0)
-    for before in range(lane):
+    for before in range(own):
         start += totals[before]
-    for item in range(spans[lane], spans[lane + 1]):
+    for item in range(share_start(items, own, shares), share_start(items, own + 1, shares)):
         number = counts[item]
         starts[item] = start
         start += number
-    if lane == lanes - 1:
-        starts[spans[lanes]] = start
+    if own == shares - 1:
+        starts[items] = start
 
 
-def record_sort(recorder, keys: wp.array, bins: wp.array, items: Count, result: SortedItems) -> None:
+def record_sort(recorder, keys: wp.array, bins: Count, items: Count, result: SortedItems, order_last: bool = True) -> None:
     """Sort the items of a population by key.
 
     Args:
         recorder: where the launches go.
-        keys: key of each item, int, shape (item capacity,); all in ``range(bins[0])``.
-        bins: number of different keys, int, shape (1,) or the last entry of a longer array; at most the room of the result.
+        keys: key of each item, int, shape (item capacity,); all in ``range(bins)``.
+        bins: how many different keys there are; at most the room of the result.
         items: the population.
         result: receives starts and order.
+        order_last: whether the order within the last key matters; there may be too many of it for one thread.
     """
-    recorder.share(count_own_keys, [keys, items.spans, bins, result.cursor, result.totals])
-    recorder.share(place_own_keys, [keys, items.spans, bins, result.totals, result.cursor, result.starts, result.order])
+    if recorder.wide:
+        recorder.each(clear_counts, bins, [result.cursor])
+        recorder.each(count_keys, items, [keys, result.cursor])
+        record_running_totals(recorder, result.cursor, bins, result.totals, result.starts)
+        recorder.each(take_places, items, [keys, result.starts, result.cursor, result.order])
+        recorder.each(order_places, bins, [0 if order_last else 1, result.starts, result.order])
+        return
+    recorder.share(count_own_keys, [keys, items.spans, bins.spans, result.cursor, result.totals])
+    recorder.share(place_own_keys, [keys, items.spans, bins.spans, result.totals, result.cursor, result.starts, result.order])
 
 
 def record_running_totals(recorder, counts: wp.array, items: Count, totals: wp.array, starts: wp.array) -> None:

@@ -91,14 +91,14 @@ def sort_stage(arrays: DemArrays, recorder) -> None:
     grains, cells, precision = arrays.grains, arrays.cells, arrays.recipe.precision
     active = grains.active
     recorder.share(build_find_corners(precision), [active.spans, grains.place, cells.corners])
-    recorder.once(build_lay_cells(precision), [cells.corners, cells.levels, cells.low, cells.bins, cells.room])
-    recorder.each(build_cell_keys(precision), active, [grains.place, cells.levels, cells.low, cells.bins, arrays.keys])
-    record_sort(recorder, arrays.keys, cells.bins, active, arrays.in_cells)
+    recorder.once(build_lay_cells(precision), [cells.corners, cells.levels, cells.low, cells.bins.spans, cells.bins.capacity])
+    recorder.each(build_cell_keys(precision), active, [grains.place, cells.levels, cells.low, cells.bins.spans, arrays.keys])
+    record_sort(recorder, arrays.keys, cells.bins, active, arrays.in_cells, order_last=False)
     for array in grains.sorted_arrays:
         spare = arrays.spare[array.dtype]
         recorder.each(neighbours.build_take_in_order(array.dtype), active, [arrays.in_cells.order, array, spare])
         recorder.each(neighbours.build_put_back(array.dtype), active, [spare, array])
-    recorder.once(neighbours.count_active, [arrays.in_cells.starts, cells.bins, active.spans])
+    recorder.once(neighbours.count_active, [arrays.in_cells.starts, cells.bins.spans, active.spans])
     if arrays.bodies:
         recorder.each(body_motion.find_members, active, [grains.member, arrays.bodies.sphere_at])
 
@@ -121,7 +121,7 @@ def list_stage(arrays: DemArrays, recorder) -> None:
 
     def fill():
         record_fill(recorder, arrays.pair_list, arrays.every_start, partial(pairs, True))
-        record_sort(recorder, arrays.pair_list.partner, active.spans, arrays.pair_list.pairs, arrays.met)
+        record_sort(recorder, arrays.pair_list.partner, active, arrays.pair_list.pairs, arrays.met)
         if arrays.walls:
             record_fill(recorder, arrays.wall_list, arrays.every_start, partial(walls, True))
         if arrays.tools:

@@ -11,13 +11,14 @@ import warp as wp
 from sand_sim.contact.response import build_drifting, build_meeting, memory_type
 from sand_sim.engine.act import build_act, build_acts
 from sand_sim.engine.contact_list import listed_at
+from sand_sim.engine.count import count_of
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.pair_forces import build_direction
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.tools import tool_types
 from sand_sim.precision import Precision
 
-SUM_BLOCK = 128  # contacts per partial sum of a wrench; fixed, so that the sum does not depend on the number of lanes
+SUM_BLOCK = 128  # contacts per partial sum of a wrench; fixed, so that the sum does not depend on the number of shares
 
 
 @cache
@@ -224,7 +225,7 @@ def build_wrench_blocks(recipe: Recipe) -> wp.Kernel:
     @kernel
     def wrench_blocks(
         lane: int,
-        lanes: int,
+        shares: int,
         pair_spans: wp.array(dtype=int),
         partner: wp.array(dtype=int),
         tool_of: wp.array(dtype=int),
@@ -234,9 +235,10 @@ def build_wrench_blocks(recipe: Recipe) -> wp.Kernel:
         tools: int,
         blocks: wp.array2d(dtype=wp.vec3d),
     ):
-        pairs = pair_spans[pair_spans.shape[0] - 1]
+        own = lane + wp.tid()
+        pairs = count_of(pair_spans)
         number = (pairs + wp.static(SUM_BLOCK) - 1) // wp.static(SUM_BLOCK)
-        for block in range(number * lane // lanes, number * (lane + 1) // lanes):
+        for block in range(number * own // shares, number * (own + 1) // shares):
             for tool in range(tools):
                 blocks[block * tools + tool, 0] = wp.vec3d(wp.float64(0.0))
                 blocks[block * tools + tool, 1] = wp.vec3d(wp.float64(0.0))

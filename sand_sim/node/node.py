@@ -182,7 +182,7 @@ class SandSimNode(Node):
             "commands rejected": str(sum(simulation.rejected.values())),
             "last rejection": simulation.last_rejection,
         } | {f"commands rejected: {reason}": str(count) for reason, count in simulation.rejected.items()}
-        device = f"cpu, {simulation.world.assembly.solver.device.lanes} threads"
+        device = simulation.world.assembly.solver.device.label
         message = health_to_diagnostics(self._last.health, self._last.time, f"{self.get_name()}: world", device, further)
         if simulation.fault is not None:
             message.status[0].level = DiagnosticStatus.ERROR

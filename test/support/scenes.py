@@ -32,7 +32,7 @@ class SceneMaker:
         numbers |= further.pop("numbers", {})
         wall = further.pop("wall", {"density": 2500.0, "young": RIGID, "poisson": 0.3})
         solver = {"precision": further.pop("precision", "double")}
-        for name in ("time_step", "force_time_step", "skin", "threads", "integrator"):
+        for name in ("time_step", "force_time_step", "skin", "threads", "integrator", "device"):
             if name in further:
                 solver[name] = further.pop(name)
         parsed = {

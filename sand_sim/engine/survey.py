@@ -1,0 +1,44 @@
+"""What a program launches, found without launching it."""
+
+from collections.abc import Callable
+
+import warp as wp
+
+from sand_sim.engine.count import Count
+from sand_sim.engine.kernel import fill_gaps
+
+
+class Survey:
+    """A recorder that only notes which kernels are launched.
+
+    Attributes:
+        kernels: the kernels, by their names, in the order in which they are first launched.
+    """
+
+    def __init__(self, device):
+        self.lanes, self.wide, self.kernels, self._device = device.lanes, device.wide, {}, device.name
+
+    def each(self, launched: wp.Kernel, over: Count, inputs: list, wait: bool = True) -> None:
+        """Note a launch over all items of a population."""
+        self._note(launched, [0, over.spans, 1, *inputs])
+
+    def share(self, launched: wp.Kernel, inputs: list, wait: bool = True) -> None:
+        """Note a launch over all shares."""
+        self._note(launched, [0, 1, *inputs])
+
+    def once(self, launched: wp.Kernel, inputs: list, wait: bool = True) -> None:
+        """Note a launch of a single thread."""
+        self._note(launched, inputs)
+
+    def when(self, flag: wp.array, body: Callable[[], None]) -> None:
+        """Note what the body launches."""
+        body()
+
+    repeat = when
+
+    def wait(self) -> None:
+        """Lanes are of no interest here."""
+
+    def _note(self, launched: wp.Kernel, inputs: list) -> None:
+        fill_gaps(launched, inputs, self._device)  # makes the dummies, for which there is no room once a capture has begun
+        self.kernels[launched.key, launched.module.name] = launched
