@@ -103,7 +103,7 @@ class DemArrays:
         self.in_cells = SortedItems.allocate(self.cells.bins.capacity, 0, on)
         own = {array.dtype: wp.zeros_like(array) for array in (self.grains.motion, self.grains.remainder)}
         others = {array.dtype for array in self.grains.sorted_arrays} - set(own)
-        self.spare = own | {dtype: Lender([own[precision.vec4]], device).lend(dtype, number) for dtype in others}
+        self.spare = own | {dtype: Lender(own[precision.vec4], device).lend(dtype, number) for dtype in others}
         # What an observer sees lies in scratch that is idle between neighbour searches.
         self.seen_motion, self.seen_spin = self.grains.motion, self.grains.spin
         if recipe.integrator == VERLET:
@@ -139,16 +139,20 @@ class DemArrays:
         if self.met.order.shape[0] != self.pair_list.pairs.capacity:  # else it holds what a pair list still in use needs
             self.met = SortedItems.allocate(self.grains.capacity, self.pair_list.pairs.capacity, self.on)
         precision = self.recipe.precision
-        # Nobody looks at old lists or at forces while the others are in use.
+        # Nobody looks at old lists or at forces while the others are in use. Not so while lists are filled: memories of contacts
+        # may lie in the forces then, so what is needed for that comes from the couples.
         self.energy = {
-            name: Lender([c.old_partner], self.device).lend(precision.real, c.pairs.capacity) for name, c in self.lists.items()
+            name: Lender(c.old_partner, self.device).lend(precision.real, c.pairs.capacity) for name, c in self.lists.items()
         }
-        lender, number = Lender([self.pair_list.couple, self.pair_list.force], self.device), self.grains.capacity
-        counts, old_starts, met_cursor, self.keys, order = (lender.lend(int, number + 1) for _ in range(5))
-        self.in_cells = replace(self.in_cells, order=order, cursor=lender.lend(int, self.cells.bins.capacity))
+        number = self.grains.capacity
+        sorting = Lender(self.pair_list.force, self.device)
+        self.keys, order = sorting.lend(int, number), sorting.lend(int, number)
+        self.in_cells = replace(self.in_cells, order=order, cursor=sorting.lend(int, self.cells.bins.capacity))
+        filling = Lender(self.pair_list.couple, self.device)
+        counts, old_starts, met_cursor = (filling.lend(int, number + 1) for _ in range(3))
         self.met = replace(self.met, cursor=met_cursor)
         for contacts in self.lists.values():
-            contacts.counts, contacts.old_starts, contacts.new_starts = counts, old_starts, lender.lend(int, number + 1)
+            contacts.counts, contacts.old_starts, contacts.new_starts = counts, old_starts, filling.lend(int, number + 1)
         self.energy_blocks = {
             name: wp.zeros(energy.blocks_for(c.pairs.capacity), dtype=wp.vec2d, device=self.device)
             for name, c in self.lists.items()

@@ -1,6 +1,4 @@
-"""Scratch that lies in arrays which are idle while it is in use, so that it costs no memory."""
-
-from collections.abc import Sequence
+"""Scratch that lies in an array which is idle while it is in use, so that it costs no memory."""
 
 import warp as wp
 
@@ -8,23 +6,22 @@ _ALIGNMENT = 16  # bytes
 
 
 class Lender:
-    """Gives away the memory of idle arrays piece by piece, and new memory where they are too small.
+    """Gives away the memory of an idle array piece by piece, and new memory where it is too small.
 
     Args:
-        arrays: whose contents nobody needs while the borrowed ones are in use; None where a scene has left one out.
+        array: whose contents nobody needs while the borrowed ones are in use; None if the scene has left it out.
         device: Warp device.
     """
 
-    def __init__(self, arrays: Sequence[wp.array | None], device: str):
+    def __init__(self, array: wp.array | None, device: str):
         self.device = device
-        self._free = [[array.ptr, array.ptr + array.capacity] for array in arrays if array is not None]
+        self._next, self._end = (array.ptr, array.ptr + array.capacity) if array is not None else (0, 0)
 
     def lend(self, dtype: type, number: int) -> wp.array:
         """An array of a shape (number,), with anything in it."""
-        size = number * wp.types.type_size_in_bytes(dtype)
-        for piece in self._free:
-            begin = -(-piece[0] // _ALIGNMENT) * _ALIGNMENT
-            if begin + size <= piece[1]:
-                piece[0] = begin + size
-                return wp.array(ptr=begin, dtype=dtype, shape=(number,), device=self.device, copy=False)
-        return wp.zeros(number, dtype=dtype, device=self.device)
+        begin = -(-self._next // _ALIGNMENT) * _ALIGNMENT
+        end = begin + number * wp.types.type_size_in_bytes(dtype)
+        if end > self._end:
+            return wp.zeros(number, dtype=dtype, device=self.device)
+        self._next = end
+        return wp.array(ptr=begin, dtype=dtype, shape=(number,), device=self.device, copy=False)
