@@ -10,9 +10,8 @@ from sand_sim.assemble import Assembly
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.explicit_dem import ExplicitDem
 from sand_sim.engine.lattice import Lattice
-from sand_sim.engine.measuring import record_measurement
+from sand_sim.engine.launches import list_kernels
 from sand_sim.engine.recipe import Recipe
-from sand_sim.engine.stages import record_run
 from sand_sim.grain_table import GrainTable
 from sand_sim.integrator import VERLET
 from sand_sim.scene.clumps import place_clumps
@@ -53,29 +52,6 @@ class Plan:
     duration: float | None
 
 
-class _Listing:
-    """A recorder that only notes which kernels are launched."""
-
-    def __init__(self, lanes: int):
-        self.lanes, self.kernels = lanes, {}
-
-    def each(self, launched, over, inputs, wait=True):
-        self.kernels[launched.key] = None
-
-    def share(self, launched, inputs, wait=True):
-        self.kernels[launched.key] = None
-
-    once = share
-
-    def when(self, flag, body):
-        body()
-
-    repeat = when
-
-    def wait(self):
-        """Lanes are of no interest here."""
-
-
 def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
     """Plan a scene.
 
@@ -84,9 +60,6 @@ def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
         measure: run a packed sample of grains for a moment to predict the cost.
     """
     arrays, scene, solver = assembly.solver.arrays, assembly.scene, assembly.solver
-    listing = _Listing(arrays.lanes)
-    record_run(arrays, solver.stages, listing)
-    record_measurement(arrays, solver.stages, listing)
     sizes = array_sizes(arrays)
     steps = round(scene.duration / assembly.time_step.value)
     spheres = len(assembly.table)
@@ -100,7 +73,7 @@ def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
         spheres=spheres,
         kept=kept,
         left_out=left_out(assembly),
-        kernels=sorted(name.rsplit("__", 1)[-1] for name in listing.kernels),
+        kernels=sorted(one.key.rsplit("__", 1)[-1] for one in list_kernels(arrays, solver.stages)),
         arrays=sizes,
         bytes_per_sphere=sum(sizes.values()) / spheres,
         time_step=asdict(assembly.time_step),
