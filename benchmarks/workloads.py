@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import trimesh
 
-from benchmarks.beds import RADIUS, WIDTHS, bed_scene, find_bed
+from benchmarks.beds import WIDTHS, bed_scene, blade_tool, find_bed
 from sand_sim import ToolPose, World, read_scene
+from sand_sim.tool_model import Progress
 
 BLADE_SPEED = 0.1  # [m/s]
-BLADE = {"low": (0.025, 0.02, 0.014), "high": (0.025, 0.06, 0.038), "particles": 1025}  # a sheet [m]
 
 
 @dataclass
@@ -62,7 +61,9 @@ class Workload:
         }
 
 
-def make_workload(name: str, beds: Path | None, folder: Path, threads: int) -> Workload:
+def make_workload(
+    name: str, beds: Path | None, folder: Path, threads: int, progress: Progress = lambda stage, share: None
+) -> Workload:
     """A case on a number of threads.
 
     Args:
@@ -70,6 +71,7 @@ def make_workload(name: str, beds: Path | None, folder: Path, threads: int) -> W
         beds: folder of settled beds, or None.
         folder: for beds settled here.
         threads: cores.
+        progress: called with what is being done and the share of it, 0 to 1.
     """
     folder = folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
@@ -78,20 +80,12 @@ def make_workload(name: str, beds: Path | None, folder: Path, threads: int) -> W
         bed, shape = "bed_clumps_8000", "tetrahedron"
     elif name == "W3":
         bed, shape = "bed_blade_grains", "sphere"
-        fields["tools"] = {"blade": _blade(folder)}
+        fields["tools"] = {"blade": blade_tool(folder)}
     else:
         bed, shape = "bed_" + name.split("-")[1], "sphere"
     if name.endswith("idle"):
         far = {"position": [0.0, 0.0, 0.1]}
-        fields["tools"] = {f"blade_{k}": _blade(folder) | {"pose": far} for k in range(10)}
-    scene = bed_scene(WIDTHS[bed], find_bed(bed, beds, folder), shape=shape, **fields)
-    return Workload(name, World(read_scene(scene, folder)), blade=name == "W3")
-
-
-def _blade(folder: Path) -> dict:
-    low, high = np.array(BLADE["low"]), np.array(BLADE["high"])
-    path = folder / "blade.stl"
-    corners = [low, (low[0], high[1], low[2]), high, (low[0], low[1], high[2])]
-    trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]]).export(path)
-    spacing = float(np.sqrt(2.0 * np.prod((high - low)[1:]) / (np.sqrt(3.0) * BLADE["particles"])))
-    return {"mesh": str(path), "material": "sand", "particle_radius": RADIUS, "particle_spacing": spacing, "max_speed": 0.2}
+        fields["tools"] = {f"blade_{k}": blade_tool(folder) | {"pose": far} for k in range(10)}
+    widths = (WIDTHS[bed], WIDTHS[bed])
+    scene = bed_scene(widths, find_bed(bed, beds, folder, progress), shape=shape, **fields)
+    return Workload(name, World(read_scene(scene, folder), progress), blade=name == "W3")

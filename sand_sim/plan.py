@@ -10,10 +10,8 @@ from sand_sim.assemble import Assembly
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.explicit_dem import ExplicitDem
 from sand_sim.engine.lattice import Lattice
-from sand_sim.engine.measuring import record_measurement
+from sand_sim.engine.launches import list_kernels
 from sand_sim.engine.recipe import Recipe
-from sand_sim.engine.stages import record_run
-from sand_sim.engine.survey import Survey
 from sand_sim.grain_table import GrainTable
 from sand_sim.integrator import VERLET
 from sand_sim.scene.clumps import place_clumps
@@ -62,9 +60,6 @@ def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
         measure: run a packed sample of grains for a moment to predict the cost.
     """
     arrays, scene, solver = assembly.solver.arrays, assembly.scene, assembly.solver
-    survey = Survey(solver.device)
-    record_run(arrays, solver.stages, survey)
-    record_measurement(arrays, solver.stages, survey)
     sizes = array_sizes(arrays)
     steps = round(scene.duration / assembly.time_step.value)
     spheres = len(assembly.table)
@@ -78,7 +73,7 @@ def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
         spheres=spheres,
         kept=kept,
         left_out=left_out(assembly),
-        kernels=sorted(name.rsplit("__", 1)[-1] for name in {kernel.key for kernel in survey.kernels.values()}),
+        kernels=sorted(one.key.rsplit("__", 1)[-1] for one in list_kernels(arrays, solver.stages, solver.device)),
         arrays=sizes,
         bytes_per_sphere=sum(sizes.values()) / spheres,
         time_step=asdict(assembly.time_step),

@@ -156,13 +156,7 @@ class Simulation:
             commands, requests = list(self._inbox), list(self._requests)
             self._inbox.clear()
             self._requests.clear()
-        for command in commands:
-            try:
-                if self.fault is not None:
-                    raise CommandError("stopped", f"tool '{command.tool}': stepping has stopped, reset to go on")
-                self._accept(self.world.check(command))
-            except CommandError as error:
-                self.reject(error)
+        self._take_commands(commands)
         for what, future in requests:
             try:
                 if what == "reset":
@@ -180,6 +174,26 @@ class Simulation:
             except Exception as error:
                 future.set_exception(error)
                 raise
+
+    def _take_commands(self, commands: list[ToolPose]) -> None:
+        """Check commands and carry them out; outside lockstep only the last good one of each tool, which replaces the others."""
+        good = []
+        for command in commands:
+            try:
+                if self.fault is not None:
+                    raise CommandError("stopped", f"tool '{command.tool}': stepping has stopped, reset to go on")
+                good.append(self.world.check(command))
+            except CommandError as error:
+                self.reject(error)
+        replaced: set[str] = set()
+        for command in good if self.pacing == "lockstep" else reversed(good):
+            try:
+                if command.tool not in replaced:
+                    self._accept(command)
+                    if self.pacing != "lockstep":
+                        replaced.add(command.tool)
+            except CommandError as error:
+                self.reject(error)
 
     def _fail(self, error: Exception) -> None:
         if self.fault is not error:
@@ -205,9 +219,9 @@ class Simulation:
             wanted = now + max(passed, self.world.time_step)
             self.limited += soonest > wanted
             command = ToolPose(command.tool, command.position, command.orientation, max(wanted, soonest))
+        self.world.apply(command)
         self._last_command[command.tool] = now
         course.clear()
-        self.world.apply(command)
 
     def _allowed_until(self) -> float:
         """Simulated time up to which stepping is allowed now."""

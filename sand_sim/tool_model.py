@@ -28,6 +28,13 @@ class ToolModel:
         """Farthest particle surface from the tool frame's origin [m]."""
         return float(np.linalg.norm(self.body.points, axis=1).max() + self.body.radius)
 
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest corner of its hull in the world at the initial pose, shape (3,) each [m]."""
+        pose = self.tool.pose
+        corners = np.asarray(pose.position) + rotation.rotate(np.asarray(pose.orientation), np.asarray(self.mesh.vertices))
+        return corners.min(axis=0) - self.body.radius, corners.max(axis=0) + self.body.radius
+
     def distance(self, position: np.ndarray) -> np.ndarray:
         """Distance of world points, shape (n, 3), from the particles' hull at the initial pose, shape (n,) [m]."""
         pose = self.tool.pose

@@ -154,6 +154,20 @@ def test_streamed_poses_are_reached_after_their_own_interval(scene):
         assert START[2] - 0.02 <= report.position[2] <= START[2] - 0.0175
 
 
+def test_of_poses_that_came_together_the_last_good_one_counts(scene):
+    world = World(scene)
+    simulation = Simulation(world, "fast")
+    for k in range(5):
+        simulation.submit(pose(START - [0.0, 0.0, 0.001 * k]))
+    simulation.submit(pose([np.nan, 0.0, 0.0]))
+    simulation.submit(pose(START + 1.0, at=1e-3))  # too fast
+    simulation._take_in()
+    assert simulation.rejected == {"not_finite": 1, "too_fast": 1}
+    world.step(round((world.arrival("plate") - world.time) / world.time_step))
+    assert world.observe().tools[0].position == pytest.approx(START - [0.0, 0.0, 0.004])
+    assert simulation.limited == 0, "it has all the time that passed since the poses before"
+
+
 def test_streamed_poses_out_of_reach_are_approached_at_top_speed(scene):
     with Running(scene, "fast") as running:
         simulation = running.simulation

@@ -13,12 +13,12 @@ def main(arguments: list[str] | None = None) -> int:
         Exit code: 0 done, 1 refused with one line that says why, 130 interrupted.
     """
     interruption = Interruption()  # before the long imports
-    from sand_sim.cli import demo, pareto, plan, play, run, stability
+    from sand_sim.cli import bench, demo, pareto, plan, play, run, stability
     from sand_sim.scene.types import SceneError
 
     parser = argparse.ArgumentParser(prog="sand_sim", description=__doc__.split(": ", 1)[1])
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
-    for verb in (run, demo, play, plan, pareto, stability):
+    for verb in (run, demo, play, plan, pareto, stability, bench):
         name = verb.__name__.rsplit(".", 1)[-1]
         first = verb.__doc__.split("\n", 1)[0]
         one = verbs.add_parser(name, help=first, description=first)

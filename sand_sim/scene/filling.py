@@ -36,7 +36,7 @@ def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -
     largest = _largest(fill.size) * (shape.bounding_radius / shape.equal_radius if shape else 1.0)
     points = _lattice(np.asarray(fill.low, float), np.asarray(fill.high, float), largest, random)
     for wall in walls:
-        points = points[wall.distance(points) > largest]
+        points = points[_clear(wall, points, largest)]
     wanted = fill.count or _count_for_height(fill, walls, random)
     if wanted > len(points):
         raise SceneError(
@@ -46,6 +46,17 @@ def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -
     radius = _draw(fill.size, wanted, random)
     turns = rotation.at_random(wanted, random) if shape else None
     return _table(points[:wanted], radius, fill, material, index, shape, turns)
+
+
+def _clear(solid, points: np.ndarray, gap: float) -> np.ndarray:
+    """Whether points are farther than a gap from a solid, shape (n,); of one with a box only those near it are measured."""
+    if not hasattr(solid, "box"):
+        return solid.distance(points) > gap
+    low, high = solid.box
+    near = np.all((points > low - gap) & (points < high + gap), axis=1)
+    clear = ~near
+    clear[near] = solid.distance(points[near]) > gap
+    return clear
 
 
 def _largest(size: SizeDistribution) -> float:
@@ -90,10 +101,14 @@ def _even(count: int) -> np.ndarray:
 def _count_for_height(fill: Fill, walls: list[Wall], random: np.random.Generator) -> int:
     """Grains for a bed of the asked height; the cross section is what the walls leave of the region, by random points."""
     low, high = np.asarray(fill.low), np.asarray(fill.high)
-    samples = random.uniform(low, [high[0], high[1], low[2] + fill.height], (200_000, 3))
+    top = np.array([high[0], high[1], low[2] + fill.height])
+    samples = random.uniform(low, top, (200_000, 3))
+    corners = np.stack(np.meshgrid(*zip(low, top, strict=True)), -1).reshape(-1, 3)
     inside = np.ones(len(samples), bool)
     for wall in walls:
-        inside &= wall.distance(samples) > 0.0
+        if getattr(wall, "kind", "") == "plane" and np.all(wall.distance(corners) >= 0.0):
+            continue  # all of it lies before the plane
+        inside &= _clear(wall, samples, 0.0)
     volume = inside.mean() * float(np.prod(high[:2] - low[:2])) * fill.height
     grain = float(np.mean(4.0 / 3.0 * np.pi * _draw(fill.size, 100_000, random) ** 3))
     return max(1, round(_POURED_FRACTION * volume / grain))
