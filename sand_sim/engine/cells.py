@@ -29,7 +29,10 @@ def level_type(precision: Precision) -> type:
         radius: whole  # [quantum] largest radius of the level's spheres
         reach: real  # [quantum] smallest allowed cell edge
         inverse_cell: real  # [1/quantum]
-        nx: int
+        fast: int  # the axis along which cells are numbered first, the shortest: neighbours lie near each other in memory
+        middle: int
+        slow: int  # the longest
+        nx: int  # cells along these axes, in this order
         ny: int
         nz: int
         first_key: int  # key of the level's cell (0, 0, 0)
@@ -115,7 +118,7 @@ def build_find_corners(precision: Precision) -> wp.Kernel:
 @cache
 def build_lay_cells(precision: Precision) -> wp.Kernel:
     """Kernel, one thread, that lays all levels over the bounding box; cells grow where they would outnumber their room."""
-    real, whole3 = precision.real, precision.whole3
+    real, vec3, whole3 = precision.real, precision.vec3, precision.whole3
     level = level_type(precision)
 
     @kernel
@@ -132,9 +135,18 @@ def build_lay_cells(precision: Precision) -> wp.Kernel:
             lowest = wp.min(lowest, corners[share_of, 0])
             highest = wp.max(highest, corners[share_of, 1])
         low[0] = lowest
-        span_x = wp.max(real(highest[0] - lowest[0]), real(0.0))
-        span_y = wp.max(real(highest[1] - lowest[1]), real(0.0))
-        span_z = wp.max(real(highest[2] - lowest[2]), real(0.0))
+        span = vec3(real(highest[0] - lowest[0]), real(highest[1] - lowest[1]), real(highest[2] - lowest[2]))
+        fast = int(0)
+        slow = int(0)
+        for axis in range(1, 3):
+            if span[axis] < span[fast]:
+                fast = axis
+            if span[axis] >= span[slow]:
+                slow = axis
+        middle = 3 - fast - slow
+        span_x = wp.max(span[fast], real(0.0))
+        span_y = wp.max(span[middle], real(0.0))
+        span_z = wp.max(span[slow], real(0.0))
         share = real(room / levels.shape[0] - 1)
         key = int(0)
         for k in range(levels.shape[0]):
@@ -145,6 +157,9 @@ def build_lay_cells(precision: Precision) -> wp.Kernel:
                 cell = cell * real(1.05)
                 number = (span_x / cell + real(1.0)) * (span_y / cell + real(1.0)) * (span_z / cell + real(1.0))
             one.inverse_cell = real(1.0) / cell
+            one.fast = fast
+            one.middle = middle
+            one.slow = slow
             one.nx = int(span_x / cell) + 1
             one.ny = int(span_y / cell) + 1
             one.nz = int(span_z / cell) + 1
@@ -171,9 +186,9 @@ def cell_functions(precision: Precision):
 
     @wp.func
     def cell_of(one: level, low: whole3, place: whole4) -> wp.vec3i:
-        x = int(real(place[0] - low[0]) * one.inverse_cell)
-        y = int(real(place[1] - low[1]) * one.inverse_cell)
-        z = int(real(place[2] - low[2]) * one.inverse_cell)
+        x = int(real(place[one.fast] - low[one.fast]) * one.inverse_cell)
+        y = int(real(place[one.middle] - low[one.middle]) * one.inverse_cell)
+        z = int(real(place[one.slow] - low[one.slow]) * one.inverse_cell)
         return wp.vec3i(wp.min(x, one.nx - 1), wp.min(y, one.ny - 1), wp.min(z, one.nz - 1))
 
     return level_of, cell_of
