@@ -63,7 +63,8 @@ def copy_bandwidth(device) -> float:
 def measure(case: str, beds: Path | None, folder: Path) -> dict:
     """Time a case."""
     bed = tile_bed(CASES[case], find_bed(TILE, beds, folder), folder)
-    world = World(read_scene(bed_scene(CASES[case] * WIDTHS[TILE], bed, solver={"device": "cuda"}), folder))
+    width = CASES[case] * WIDTHS[TILE]
+    world = World(read_scene(bed_scene((width, width), bed, solver={"device": "cuda"}), folder))
     solver = world.assembly.solver
     solver.run(SETTLE)
     times = []
