@@ -1,4 +1,4 @@
-"""Speed on an NVIDIA GPU: settled beds of a million and of four million spheres (W1 side by side); one JSON line per case.
+"""Speed on an NVIDIA GPU: settled beds of one and of four million spheres, mirror images of one tile; one JSON line per case.
 
 Bytes are those that a step must move at least, each array once per stage that needs it; the bandwidth is that of a copy on the
 same device, measured in the same run. Run from the root of the source tree: ``python -m benchmarks.gpu``.
@@ -13,25 +13,15 @@ from pathlib import Path
 import numpy as np
 import warp as wp
 
-from benchmarks.beds import WIDTHS, bed_scene, find_bed
 from benchmarks.profile import time_stages
 from benchmarks.provenance import provenance
-from sand_sim import World, read_scene
+from benchmarks.scaling import repeated_world
+from benchmarks.speed import Setup
 
-TILE = "bed_32000"
-CASES = {"W1-1M": 6, "W1-4M": 11}  # beds side by side, along x and along y
+TILE = "tile_8000"
+CASES = {"W1-1M": (25, 5), "W1-4M": (25, 20)}  # images of the tile along x and y
 SETTLE, STEPS, ROUNDS, CYCLES = 2000, 500, 5, 3
 COPIED = 2**30  # [B]
-
-
-def tile_bed(tiles: int, bed: Path, folder: Path) -> Path:
-    """An npz file of beds side by side."""
-    with np.load(bed) as columns:
-        position, radius = columns["position"], columns["radius"]
-    width, path = WIDTHS[TILE], folder / f"{TILE}_x{tiles}.npz"
-    shifts = np.array([[width * x, width * y, 0.0] for x in range(tiles) for y in range(tiles)])
-    np.savez(path, position=(shifts[:, None] + position).reshape(-1, 3), radius=np.tile(radius, len(shifts)))
-    return path
 
 
 def least_bytes(arrays) -> float:
@@ -60,11 +50,9 @@ def copy_bandwidth(device) -> float:
     return 2.0 * COPIED / float(np.median(times))
 
 
-def measure(case: str, beds: Path | None, folder: Path) -> dict:
+def measure(case: str, setup: Setup) -> dict:
     """Time a case."""
-    bed = tile_bed(CASES[case], find_bed(TILE, beds, folder), folder)
-    width = CASES[case] * WIDTHS[TILE]
-    world = World(read_scene(bed_scene((width, width), bed, solver={"device": "cuda"}), folder))
+    world = repeated_world(TILE, CASES[case], setup, solver={"device": "cuda"})
     solver = world.assembly.solver
     solver.run(SETTLE)
     times = []
@@ -102,10 +90,9 @@ def main() -> None:
         parser.error(f"unknown case '{unknown.pop()}'; known are {', '.join(CASES)}")
     if not wp.is_cuda_available():
         sys.exit("gpu: needs an NVIDIA GPU and its driver, and none is found here")
-    folder = Path("out/beds").resolve()
-    folder.mkdir(parents=True, exist_ok=True)
+    setup = Setup(options.beds, Path("out/beds"), (1,), ROUNDS, 0.0, lambda stage, share: None)
     for case in options.cases:
-        print(json.dumps(measure(case, options.beds, folder)), flush=True)
+        print(json.dumps(measure(case, setup)), flush=True)
 
 
 if __name__ == "__main__":

@@ -10,8 +10,8 @@ from sand_sim.assemble import Assembly
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.explicit_dem import ExplicitDem
 from sand_sim.engine.lattice import Lattice
-from sand_sim.engine.launches import list_kernels
 from sand_sim.engine.recipe import Recipe
+from sand_sim.engine.survey import list_kernels
 from sand_sim.grain_table import GrainTable
 from sand_sim.integrator import VERLET
 from sand_sim.scene.clumps import place_clumps

@@ -57,8 +57,8 @@ def model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
         path = locate_mesh(tool.mesh, scene.folder)
         mesh = read_mesh(path, tool.scale)
         show = partial(progress, f"sampling {tool.name}")
-        fineness = {"spacing": tool.particle_spacing, "grain": _smallest_grain(scene)}
-        body = sample_file(path, tool.particle_radius, tool.scale, progress=show, **fineness)
+        grain, spacing = _smallest_grain(scene), tool.particle_spacing
+        body = sample_file(path, tool.particle_radius, tool.scale, grain=grain, spacing=spacing, progress=show)
     except MeshError as error:
         raise SceneError(f"tools.{tool.name}.mesh: {error}") from None
     return ToolModel(tool, mesh, body)

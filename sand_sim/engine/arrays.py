@@ -113,14 +113,15 @@ class DemArrays:
         self.every_start.set(number + 1)
         self.met = SortedItems.allocate(number, 0, on)
 
+        few = max(int(_FIRST_OTHERS * number), 64)
         self.pair_list = self._contact_list(_FIRST_PAIRS * number)
         self.walls = wp.array(walls, dtype=Surface, device=device) if walls else None
-        self.wall_list = self._contact_list(max(int(_FIRST_OTHERS * number), 64)) if walls else None
+        self.wall_list = self._contact_list(few) if walls else None
         self.plungers = Plungers(list(drives), device) if drives else None
         self.plunger_states = self.plungers.states if drives else None
         farthest = float(table.radius.max()) + setting.listing_gap
         self.tools = Tools(bodies, farthest, precision, device) if bodies else None
-        self.tool_list = self._contact_list(max(int(_FIRST_OTHERS * number), 64)) if bodies else None
+        self.tool_list = self._contact_list(few) if bodies else None
         self.grain_blocks = wp.zeros(energy.blocks_for(number), dtype=wp.vec3d, device=device)
         self.make_room()
 

@@ -35,7 +35,8 @@ class ContactList:
 
     def __init__(self, room: int, grains: int, recipe: Recipe, on):
         self.recipe, self.device = recipe, on.name
-        self.pairs, device = Count(0, on.lanes, on.name), on.name
+        device = on.name
+        self.pairs = Count(0, on.lanes, device)
         self.totals, self.starts = wp.zeros(on.shares, dtype=int, device=device), wp.zeros(grains + 1, dtype=int, device=device)
         self.counts = self.new_starts = self.old_starts = None
         self.wanted = wp.zeros(1, dtype=int, device=device)

@@ -30,21 +30,18 @@ class Count:
 
 
 @wp.func
-def share_out(spans: wp.array(dtype=int), number: int):
-    """Device side of ``Count.set``."""
-    lanes = spans.shape[0] - 1
-    share = (wp.max(number, 1) + lanes - 1) // lanes
-    share = (share + wp.static(_ALIGNMENT) - 1) // wp.static(_ALIGNMENT) * wp.static(_ALIGNMENT)
-    for k in range(lanes + 1):
-        spans[k] = wp.min(k * share, number)
-
-
-@wp.func
 def share_start(number: int, own: int, shares: int) -> int:
     """First item of one of so many equal shares; the same as ``spans`` where there are as many shares as lanes."""
     share = (wp.max(number, 1) + shares - 1) // shares
     share = (share + wp.static(_ALIGNMENT) - 1) // wp.static(_ALIGNMENT) * wp.static(_ALIGNMENT)
     return wp.min(own * share, number)
+
+
+@wp.func
+def share_out(spans: wp.array(dtype=int), number: int):
+    """Device side of ``Count.set``."""
+    for lane in range(spans.shape[0]):
+        spans[lane] = share_start(number, lane, spans.shape[0] - 1)
 
 
 @wp.func

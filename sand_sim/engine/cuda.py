@@ -14,7 +14,6 @@ import warp as wp
 from sand_sim.engine.count import Count
 from sand_sim.engine.kernel import fill_gaps
 from sand_sim.engine.lanes import RECORDING, available_cores
-from sand_sim.engine.survey import Survey
 
 _SHARES = 4096  # sums over all shares are serial, walks through one share too; for a million items this balances them
 _BLOCK = 128  # threads; contact kernels need many registers
@@ -95,19 +94,19 @@ class CudaDevice:
         self.name, self.label = device.alias, f"{device.alias}, {device.name}"
         self.threads = device.sm_count * _THREADS_PER_MULTIPROCESSOR * _WAVES
 
+    def load(self, kernels: list[wp.Kernel]) -> None:
+        """Compile what is not in Warp's cache, on several threads, and load it all; nothing can be loaded while recording."""
+        wp.force_load(self.name, [one.module for one in kernels], block_dim=_BLOCK, max_workers=available_cores())
+
     def record(self, program: Callable[[CudaRecorder], None]) -> Callable[[], None]:
         """Record a program as one graph.
 
         Args:
-            program: launches its stages on the recorder it is given; called twice, first to see what is to be compiled.
+            program: launches its stages on the recorder it is given, of kernels that have been loaded.
 
         Returns:
             A function that sets the recorded program going. Reading an array waits until it is done.
         """
-        survey = Survey(self)
-        program(survey)
-        modules = list({kernel.module for kernel in survey.kernels.values()})
-        wp.force_load(self.name, modules, block_dim=_BLOCK, max_workers=available_cores())
         with RECORDING, wp.ScopedCapture(device=self.name) as capture:
             program(CudaRecorder(self))
         return lambda: wp.capture_launch(capture.graph)

@@ -1,7 +1,8 @@
 """Which device a scene runs on.
 
 A device has a ``name`` for Warp and a ``label`` for people; ``lanes`` into which populations are cut (``count.Count``);
-``shares`` among which launches by ``share`` are cut; it is ``wide`` if many threads work on one lane; and it records programs.
+``shares`` among which launches by ``share`` are cut; it is ``wide`` if many threads work on one lane. It loads kernels and
+records programs.
 """
 
 import re

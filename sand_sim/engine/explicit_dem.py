@@ -7,10 +7,10 @@ import numpy as np
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.energy import blocks_for
 from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_ROOM, FAULT_TOO_FAST
-from sand_sim.engine.launches import load_kernels
 from sand_sim.engine.measuring import record_measurement
 from sand_sim.engine.stages import choose_stages, record_renewal, record_run
 from sand_sim.engine.state import put_state, take_state
+from sand_sim.engine.survey import list_kernels
 
 
 class UnstableError(RuntimeError):
@@ -53,7 +53,7 @@ class ExplicitDem:
         self.arrays, self.device = arrays, device
         self.stages = choose_stages(arrays)
         self._programs = {}
-        load_kernels(arrays, self.stages, device)
+        device.load(list_kernels(arrays, self.stages, device))
         arrays.flags.starting.fill_(1)
         self.expect_moves()
 

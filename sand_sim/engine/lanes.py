@@ -135,6 +135,10 @@ class CpuDevice:
         self.meeting_arguments = [self._meeting, self.lanes, _SPINS_BEFORE_YIELD, wp.uint64(give_way)]
         self._threads = ThreadPoolExecutor(self.lanes, thread_name_prefix="sand_sim lane")
 
+    def load(self, kernels: list[wp.Kernel]) -> None:
+        """Compile what is not in Warp's cache, on several threads, and load it all."""
+        wp.force_load("cpu", [one.module for one in kernels], max_workers=available_cores())
+
     def record(self, program: Callable[[LaneRecorder], None]) -> Callable[[], None]:
         """Record a program once per lane.
 

@@ -42,7 +42,7 @@ def adapt_skin(
     """Choose the skin of the lists about to be made."""
     steps = steps_done[0] - renewed_at[0]
     renewed_at[0] = steps_done[0]
-    if steps > wp.int64(0) and radius > wp.float64(0.0):
+    if steps > wp.int64(0):
         travel = wp.float64(0.5) * width[0] / wp.float64(steps)
         best = wp.sqrt(wp.float64(2.0 * wp.static(_SEARCH)) * radius * travel)
         width[0] = wp.clamp(best, wp.float64(wp.static(_NARROWEST)) * widest, widest)
@@ -60,5 +60,5 @@ def narrow_skin(
     """Have lists made anew whose skin has turned out to be too wide."""
     steps = wp.float64(steps_done[0] - renewed_at[0])
     too_long = wp.float64(wp.static(_TOO_LONG * _SEARCH)) * radius / width[0]
-    if radius > wp.float64(0.0) and steps > too_long and width[0] > wp.float64(wp.static(_NARROWEST)) * widest:
+    if steps > too_long and width[0] > wp.float64(wp.static(_NARROWEST)) * widest:
         grains_moved[0] = 1

@@ -1,11 +1,14 @@
-"""What a program launches, found without launching it."""
+"""What a world launches, found without launching it, so that all of it is compiled side by side before the first step."""
 
 from collections.abc import Callable
 
 import warp as wp
 
+from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.count import Count
 from sand_sim.engine.kernel import fill_gaps
+from sand_sim.engine.measuring import record_measurement
+from sand_sim.engine.stages import Stages, record_run
 
 
 class Survey:
@@ -42,3 +45,11 @@ class Survey:
     def _note(self, launched: wp.Kernel, inputs: list) -> None:
         fill_gaps(launched, inputs, self._device)  # makes the dummies, for which there is no room once a capture has begun
         self.kernels[launched.key, launched.module.name] = launched
+
+
+def list_kernels(arrays: DemArrays, stages: Stages, device) -> list[wp.Kernel]:
+    """All kernels of a world's steps and measurements on a device."""
+    survey = Survey(device)
+    record_run(arrays, stages, survey)
+    record_measurement(arrays, stages, survey)
+    return list(survey.kernels.values())

@@ -10,6 +10,8 @@ import warp as wp
 from many_threads import ManyThreads
 
 from benchmarks import gpu
+from benchmarks.beds import WIDTHS
+from benchmarks.speed import Setup
 
 ROOT = Path(__file__).parents[2]
 
@@ -27,14 +29,14 @@ def test_without_a_gpu_it_says_so_in_one_line():
 def test_its_measures_make_sense(tmp_path, monkeypatch):
     """On the stand-in, with a bed of a few grains, two by two."""
     lattice = np.stack(np.meshgrid(range(5), range(5), range(4), indexing="ij"), -1).reshape(-1, 3)
-    np.savez(tmp_path / "bed_32000.npz", position=0.001 + 0.00199 * lattice, radius=np.full(len(lattice), 0.001))
+    np.savez(tmp_path / "tile_8000.npz", position=0.001 + 0.00199 * lattice, radius=np.full(len(lattice), 0.001))
     monkeypatch.setattr("sand_sim.assemble.open_device", lambda name, threads: ManyThreads(1000, 64))
-    monkeypatch.setattr(gpu, "CASES", {"small": 2})
-    monkeypatch.setattr(gpu, "WIDTHS", {"bed_32000": 0.01})
+    monkeypatch.setattr(gpu, "CASES", {"small": (2, 2)})
+    monkeypatch.setitem(WIDTHS, "tile_8000", 0.01)
     monkeypatch.setattr(gpu, "COPIED", 2**22)
     for name in ("SETTLE", "STEPS", "CYCLES"):
         monkeypatch.setattr(gpu, name, 2)
-    row = gpu.measure("small", None, tmp_path)
+    row = gpu.measure("small", Setup(None, tmp_path, (1,), 1, 0.0, lambda stage, share: None))
     assert row["grains"] == 400
     assert row["least_bytes_per_second"] > 0.0
     assert set(row["microseconds_per_stage"]) >= {"pair forces", "move grains", "sort grains", "list contacts"}

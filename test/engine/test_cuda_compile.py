@@ -13,9 +13,7 @@ from sand_sim.assemble import assemble
 from sand_sim.contact.model import SLOTS, ContactModel
 from sand_sim.engine import energy, motion, neighbours, pair_forces, plungers, recipe, surface_contacts, tool_contacts
 from sand_sim.engine.body_motion import build_move_bodies, build_see_bodies
-from sand_sim.engine.measuring import record_measurement
-from sand_sim.engine.stages import record_renewal, record_run
-from sand_sim.engine.survey import Survey
+from sand_sim.engine.survey import list_kernels
 from sand_sim.integrator import INTEGRATORS
 from sand_sim.precision import PRECISIONS
 
@@ -39,10 +37,7 @@ def launched(name):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sand_sim.assemble.open_device", lambda name, threads: ManyThreads())
         solver = assemble(load_scene(CONFIG / f"{name}.yaml")).solver
-    survey = Survey(solver.device)
-    for record in (record_run, record_renewal, record_measurement):
-        record(solver.arrays, solver.stages, survey)
-    return list(survey.kernels.values())
+    return list_kernels(solver.arrays, solver.stages, solver.device)
 
 
 def test_kernels_of_the_dig_compile(tmp_path):

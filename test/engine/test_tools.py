@@ -6,7 +6,7 @@ import trimesh
 import yaml
 from scenes import SceneMaker, record, write_small_scene
 
-from sand_sim import CommandError, ToolPose, World, read_scene
+from sand_sim import CommandError, SceneError, ToolPose, World, read_scene
 from sand_sim.playing import commands_at
 
 GRAIN = {"density": 2500.0, "young": 1e7, "poisson": 0.25}
@@ -44,6 +44,16 @@ def test_tool_carries_a_resting_grain(make_plate_world):
     assert np.abs(report.world_force[:2]).max() < 1e-2 * weight
     x, y, _ = observation.grains.position[0]
     assert report.torque == pytest.approx([-weight * y, weight * x, 0.0], abs=2e-3 * weight * 0.03)
+
+
+def test_particles_lie_as_near_to_each_other_as_asked(make_plate_world):
+    """A skin of 2 x 60 x 60 + 4 x 60 x 4 mm^2 holds 2 A / (sqrt(3) h^2) of them."""
+    position = [[0.0, 0.0, 0.05]]
+    for spacing in (0.002, 0.003):
+        body = make_plate_world(position, pose={"particle_spacing": spacing}).tools[0].body
+        assert len(body) == pytest.approx(2.0 * 8.16e-3 / (np.sqrt(3.0) * spacing**2), rel=0.02)
+    with pytest.raises(SceneError, match="particle_spacing"):
+        make_plate_world(position, pose={"particle_spacing": -0.002})
 
 
 @pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-9), ("single", 1e-6)])
