@@ -38,6 +38,25 @@ class ToolPose:
 
 
 @dataclass(frozen=True)
+class ToolVelocity:
+    """Command: a tool shall move with a velocity for a while.
+
+    Attributes:
+        tool: name.
+        linear: of the tool frame's origin, shape (3,) [m/s].
+        angular: shape (3,) [rad/s].
+        in_tool_frame: whether both are given in the tool frame as it is when the command begins, else in the world frame.
+        time: until when [s] of simulated time in lockstep; otherwise only for the order of commands (``courses.py``).
+    """
+
+    tool: str
+    linear: np.ndarray
+    angular: np.ndarray
+    in_tool_frame: bool = False
+    time: float | None = None
+
+
+@dataclass(frozen=True)
 class GrainCloud:
     """All grains that are in the domain, in the order of their identities.
 

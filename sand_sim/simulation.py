@@ -3,10 +3,9 @@
 Pacing:
     ``realtime``  simulated time follows wall time times a factor, as far as the machine keeps up.
     ``fast``      as fast as possible.
-    ``lockstep``  only up to the time of the last stamped pose of every tool that has been commanded, or by ``step``.
+    ``lockstep``  only up to the time of the last command of every tool that has been commanded, or by ``step``.
 
-A pose with a time is reached at that time. In lockstep poses queue up and their times must rise. Otherwise a pose without a time
-replaces the one before and is reached after the time that passed between the two, but never faster than the tool's ``max_speed``.
+Which commands are taken, and when each begins, is told in ``courses.py``.
 """
 
 import threading
@@ -14,15 +13,21 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from typing import Any
 
-from sand_sim.border import CommandError, Observation, ToolPose
+from sand_sim.border import CommandError, Observation
+from sand_sim.courses import USUAL, Command, Courses, StampRules
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.world import World
 
 PACINGS = ("realtime", "fast", "lockstep")
-_LONGEST_INTERVAL = 0.2  # [s] between two poses that are taken for one stream
 _LATEST = 0.2  # [s] that real time may lag behind before the arrears are forgotten
 _NAP = 0.05  # [s]
+_MOST_UNREAD = 10_000
+
+
+class RequestError(ValueError):
+    """A request that was refused; the world is as before."""
 
 
 class Simulation:
@@ -35,11 +40,12 @@ class Simulation:
         on_frame: called in the stepping thread with each observation.
         on_fault: called in the stepping thread with the error that stopped it; after ``UnstableError`` a reset brings it back.
         on_reject: called with the error for each rejected command.
+        rules: limits on the stamps of commands.
 
     Attributes:
+        courses: where the tools have been told to go.
         fault: the error that has stopped the stepping, None while all is well.
         rejected: number of rejected commands by reason.
-        limited: number of poses that were reached later than asked to keep to ``max_speed``.
         last_rejection: message of the last rejected command.
     """
 
@@ -51,19 +57,17 @@ class Simulation:
         on_frame: Callable[[Observation], None] = lambda observation: None,
         on_fault: Callable[[Exception], None] = lambda error: None,
         on_reject: Callable[[CommandError], None] = lambda error: None,
+        rules: StampRules = USUAL,
     ):
         self.world, self.pacing, self.real_time_factor = world, pacing, real_time_factor
+        self.courses = Courses(world, pacing == "lockstep", rules)
         self.fault: Exception | None = None
         self.rejected: Counter[str] = Counter()
-        self.limited = 0
         self.last_rejection = ""
         self._on_frame, self._on_fault, self._on_reject = on_frame, on_fault, on_reject
         self._wake = threading.Condition()
-        self._inbox: deque[ToolPose] = deque()
-        self._requests: deque[tuple[str, Future]] = deque()
-        self._courses = {tool.name: deque() for tool in world.scene.tools}
-        self._last_command: dict[str, float] = {}
-        self._promised: dict[str, float] = {}
+        self._inbox: deque[Command] = deque()
+        self._requests: deque[tuple[Callable[[], Any], Future]] = deque()
         self._paused = self._stopping = False
         self._due = (0.0, 0.0)
         self._frame_end = world.time + self.frame
@@ -91,11 +95,17 @@ class Simulation:
         if self._thread.ident is not None and self._thread is not threading.current_thread():
             self._thread.join()
 
-    def submit(self, command: ToolPose) -> None:
+    def submit(self, command: Command) -> None:
         """Hand a command over; it is checked and carried out, or rejected and counted, before the next step."""
         with self._wake:
-            self._inbox.append(command)
-            self._wake.notify_all()
+            full = len(self._inbox) >= _MOST_UNREAD
+            if not full:
+                self._inbox.append(command)
+                self._wake.notify_all()
+        if full:
+            self.reject(
+                CommandError("flooded", f"tool '{command.tool}': {_MOST_UNREAD} commands have come in since the last frame")
+            )
 
     def reject(self, error: CommandError) -> None:
         """Count a command that was refused before it could be submitted."""
@@ -110,20 +120,32 @@ class Simulation:
             self._due = (0.0, 0.0)
             self._wake.notify_all()
 
+    def set_pacing(self, pacing: str, real_time_factor: float) -> None:
+        """Change the pacing while it runs."""
+        with self._wake:
+            self.pacing, self.real_time_factor = pacing, real_time_factor
+            self.courses.lockstep = pacing == "lockstep"
+            self._due = (0.0, 0.0)
+            self._wake.notify_all()
+
     def step(self) -> Future:
         """Advance by one frame, also while paused or in lockstep; the future is done when its observation has been shown."""
-        return self._request("step")
+        return self.request(self._step)
 
     def reset(self) -> Future:
         """Go back to time zero and forget all commands; the future is done when the new observation has been shown."""
-        return self._request("reset")
+        return self.request(self._reset)
 
-    def _request(self, what: str) -> Future:
+    def request(self, act: Callable[[], Any]) -> Future:
+        """Do something with the world in the stepping thread, between two frames; the future holds what it returns or raises.
+
+        It may raise ``RequestError`` if it has changed nothing; any other error stops the stepping.
+        """
         future: Future = Future()
         with self._wake:
             if self._stopping:
                 future.cancel()
-            self._requests.append((what, future))
+            self._requests.append((act, future))
             self._wake.notify_all()
         return future
 
@@ -156,72 +178,27 @@ class Simulation:
             commands, requests = list(self._inbox), list(self._requests)
             self._inbox.clear()
             self._requests.clear()
-        self._take_commands(commands)
-        for what, future in requests:
+        if self.fault is None:
+            self.courses.take(commands, self.reject)
+        else:
+            for command in commands:
+                self.reject(CommandError("stopped", f"tool '{command.tool}': stepping has stopped, reset to go on"))
+        for act, future in requests:
             try:
-                if what == "reset":
-                    self._reset()
-                    self._on_frame(self.world.observe())
-                elif self.fault is not None:
-                    raise self.fault
-                else:
-                    self._frame_end = self.world.time + self.frame
-                    self._advance(self._frame_end)
-                future.set_result(None)
+                future.set_result(act())
             except UnstableError as error:
                 self._fail(error)
+                future.set_exception(error)
+            except RequestError as error:
                 future.set_exception(error)
             except Exception as error:
                 future.set_exception(error)
                 raise
 
-    def _take_commands(self, commands: list[ToolPose]) -> None:
-        """Check commands and carry them out; outside lockstep only the last good one of each tool, which replaces the others."""
-        good = []
-        for command in commands:
-            try:
-                if self.fault is not None:
-                    raise CommandError("stopped", f"tool '{command.tool}': stepping has stopped, reset to go on")
-                good.append(self.world.check(command))
-            except CommandError as error:
-                self.reject(error)
-        replaced: set[str] = set()
-        for command in good if self.pacing == "lockstep" else reversed(good):
-            try:
-                if command.tool not in replaced:
-                    self._accept(command)
-                    if self.pacing != "lockstep":
-                        replaced.add(command.tool)
-            except CommandError as error:
-                self.reject(error)
-
     def _fail(self, error: Exception) -> None:
         if self.fault is not error:
             self.fault = error
             self._on_fault(error)
-
-    def _accept(self, command: ToolPose) -> None:
-        course, now = self._courses[command.tool], self.world.time
-        if self.pacing == "lockstep":
-            latest = max(now, self._promised.get(command.tool, now))
-            if command.time is None or command.time <= latest + 0.5 * self.world.time_step:
-                stamp = "none" if command.time is None else f"{command.time:.6f} s"
-                raise CommandError(
-                    "late",
-                    f"tool '{command.tool}': stamp {stamp} must be later than {latest:.6f} s of simulated time in lockstep",
-                )
-            self._promised[command.tool] = command.time
-            course.append(command)
-            return
-        if command.time is None or command.time <= now:
-            passed = min(now - self._last_command.get(command.tool, -1.0), _LONGEST_INTERVAL)
-            soonest = now + self.world.travel(command) / self.world.scene.tool(command.tool).max_speed
-            wanted = now + max(passed, self.world.time_step)
-            self.limited += soonest > wanted
-            command = ToolPose(command.tool, command.position, command.orientation, max(wanted, soonest))
-        self.world.apply(command)
-        self._last_command[command.tool] = now
-        course.clear()
 
     def _allowed_until(self) -> float:
         """Simulated time up to which stepping is allowed now."""
@@ -230,7 +207,7 @@ class Simulation:
         if self.pacing == "fast":
             return float("inf")
         if self.pacing == "lockstep":
-            return min(self._promised.values(), default=0.0)
+            return max(self.courses.promised, 0.0)
         wall, now = time.monotonic(), self.world.time
         if self._due == (0.0, 0.0) or now < self._due[1] + (wall - self._due[0] - _LATEST) * self.real_time_factor:
             self._due = (wall, now)
@@ -240,29 +217,24 @@ class Simulation:
         """Step to a time, starting queued poses on the way, and show the world at the end of a frame or of a lockstep."""
         world = self.world
         while world.time < end - 0.5 * world.time_step and not self._stopping:
-            self._start_queued()
-            until = min([end, *(world.arrival(name) for name, course in self._courses.items() if course)])
+            self.courses.begin_waiting(self.reject)
+            until = min(end, self.courses.next_begin())
             world.step(max(1, round((until - world.time) / world.time_step)))
         if not self._stopping:
             if world.time > self._frame_end - 0.5 * world.time_step:
                 self._frame_end = world.time + self.frame
             self._on_frame(world.observe())
 
-    def _start_queued(self) -> None:
-        for name, course in self._courses.items():
-            while course and self.world.resting(name):
-                try:
-                    self.world.apply(course.popleft())
-                    break
-                except CommandError as error:
-                    self.reject(error)
+    def _step(self) -> None:
+        if self.fault is not None:
+            raise self.fault
+        self._frame_end = self.world.time + self.frame
+        self._advance(self._frame_end)
 
     def _reset(self) -> None:
         self.world.reset()
         self.fault = None
-        for course in self._courses.values():
-            course.clear()
-        self._last_command.clear()
-        self._promised.clear()
+        self.courses.clear()
         self._due = (0.0, 0.0)
         self._frame_end = self.world.time + self.frame
+        self._on_frame(self.world.observe())

@@ -1,13 +1,13 @@
 """A running world: commands in, steps, observations out."""
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
 
 import numpy as np
 
 from sand_sim import rotation
 from sand_sim.assemble import Assembly, assemble
 from sand_sim.beforehand import find_coarseness, find_fine_tools, find_overlap
-from sand_sim.border import CommandError, Health, Observation, ToolPose
+from sand_sim.border import CommandError, Health, Observation, ToolPose, ToolVelocity
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.engine.tools import ToolTrack
 from sand_sim.integrator import VERLET
@@ -81,23 +81,42 @@ class World:
         """Tools with their meshes and particles, in the order of the scene."""
         return self.assembly.tools
 
-    def check(self, command: ToolPose) -> ToolPose:
+    def check(self, command: ToolPose | ToolVelocity) -> ToolPose | ToolVelocity:
         """See that a command makes sense by itself, and bring its orientation to length one.
 
         Raises:
-            CommandError: if the tool is unknown, or pose or time are not finite.
+            CommandError: if the tool is unknown, or pose, velocity or time are not finite.
         """
         tool = f"tool '{command.tool}'"
         if command.tool not in self._tool_index:
             raise CommandError("unknown_tool", f"{tool} is unknown; known are {', '.join(self._tool_index) or 'none'}")
-        position, orientation = np.asarray(command.position, float), np.asarray(command.orientation, float)
-        numbers = np.concatenate([position, orientation, [command.time or 0.0]])
-        if not np.all(np.isfinite(numbers)):
-            raise CommandError("not_finite", f"{tool}: position, orientation and time must be finite")
-        length = float(np.linalg.norm(orientation))
-        if length < 1e-6:
-            raise CommandError("zero_quaternion", f"{tool}: orientation is the zero quaternion; (0, 0, 0, 1) is no rotation")
-        return ToolPose(command.tool, position, orientation / length, command.time)
+        moving = isinstance(command, ToolVelocity)
+        names = ("linear", "angular") if moving else ("position", "orientation")
+        values = {name: np.asarray(getattr(command, name), float) for name in names}
+        if not np.all(np.isfinite(np.concatenate([*values.values(), [command.time or 0.0]]))):
+            raise CommandError("not_finite", f"{tool}: {names[0]}, {names[1]} and time must be finite")
+        if not moving:
+            length = float(np.linalg.norm(values["orientation"]))
+            if length < 1e-6:
+                raise CommandError("zero_quaternion", f"{tool}: orientation is the zero quaternion; (0, 0, 0, 1) is no rotation")
+            values["orientation"] = values["orientation"] / length
+        return replace(command, **values)
+
+    def pose_after(self, velocity: ToolVelocity, duration: float) -> ToolPose:
+        """Where a velocity leads a tool from where it is, in a time [s].
+
+        Raises:
+            CommandError: as ``check``, and if it is half a turn or more.
+        """
+        velocity = self.check(velocity)
+        linear, angular = velocity.linear, velocity.angular
+        position, orientation = self._tracks[self._tool_index[velocity.tool]].at(self.time)
+        if velocity.in_tool_frame:
+            linear, angular = rotation.rotate(orientation, linear), rotation.rotate(orientation, angular)
+        if not np.linalg.norm(angular) * duration < np.pi:
+            raise CommandError("too_fast", f"tool '{velocity.tool}': angular velocity makes half a turn within {duration:.3g} s")
+        turned = rotation.multiply(rotation.from_vector(angular * duration), orientation)
+        return ToolPose(velocity.tool, position + linear * duration, turned)
 
     def apply(self, command: ToolPose) -> None:
         """Set a tool on its way to a pose; without a time it gets there as fast as it may.

@@ -178,7 +178,7 @@ class SandSimNode(Node):
         simulation, log = self.simulation, self.recorder.log
         further = {
             "real-time factor": f"{log.real_time_factor:.4f}",
-            "poses slowed to max_speed": str(simulation.limited),
+            "poses slowed to max_speed": str(simulation.courses.limited),
             "commands rejected": str(sum(simulation.rejected.values())),
             "last rejection": simulation.last_rejection,
         } | {f"commands rejected: {reason}": str(count) for reason, count in simulation.rejected.items()}

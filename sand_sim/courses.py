@@ -1,0 +1,215 @@
+"""Where tools have been told to go: which commands are taken, when each begins, and why the others are refused.
+
+In lockstep every command must carry a time, and times of one tool must rise. Otherwise
+
+    without a time                 it replaces all before it, and is reached after the time that passed since the command before
+    time ahead of the simulation   it waits for its turn and is reached at its time, however much comes after it
+    time just behind               (measured poses that come in with a delay) as without one, but reached after the time between
+                                   its stamp and the stamp before
+    time not after the one before  refused as ``out_of_order``
+    time too far behind            refused as ``too_old``
+    time too far ahead             refused as ``future``: mostly a stamp of the wall clock
+
+After a gap a stream begins anew: its first pose is reached after the length of a gap. A velocity holds for a while only, so that
+a tool stops when whoever drives it is gone.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from sand_sim.border import CommandError, ToolPose, ToolVelocity
+from sand_sim.world import World
+
+Command = ToolPose | ToolVelocity
+_MOST_WAITING = 100_000
+
+
+@dataclass(frozen=True)
+class StampRules:
+    """Limits on the times that commands carry, in simulated seconds.
+
+    Attributes:
+        oldest: how far a stamp may lie behind [s].
+        furthest: how far it may lie ahead [s].
+        gap: commands farther apart than this belong to two streams [s].
+        hold: how long a velocity lasts unless the next one comes [s].
+    """
+
+    oldest: float = 0.5
+    furthest: float = 60.0
+    gap: float = 0.2
+    hold: float = 0.2
+
+
+USUAL = StampRules()
+
+
+@dataclass
+class Course:
+    """What one tool has been told.
+
+    Attributes:
+        waiting: commands whose turn has not come.
+        last_stamp: of the last good command that had one [s].
+        followed_stamp: of the last command with one that was carried out at once [s].
+        last_taken: when the last command was taken [s].
+        promised: time of the last command that is reached at its own time [s]; stepping is allowed up to there in lockstep.
+    """
+
+    waiting: deque[Command] = field(default_factory=deque)
+    last_stamp: float = -np.inf
+    followed_stamp: float = -np.inf
+    last_taken: float = -np.inf
+    promised: float = -np.inf
+
+
+class Courses:
+    """The courses of all tools of a world.
+
+    Args:
+        world: whose tools they are.
+        lockstep: whether time waits for the commands.
+        rules: limits on stamps.
+
+    Attributes:
+        limited: number of commands that were slowed to keep to ``max_speed``.
+    """
+
+    def __init__(self, world: World, lockstep: bool, rules: StampRules):
+        self.lockstep, self.rules, self.limited = lockstep, rules, 0
+        self._world = world
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all commands, after which time may begin anew."""
+        self.by_tool = {tool.name: Course() for tool in self._world.scene.tools}
+
+    @property
+    def promised(self) -> float:
+        """Time up to which every tool that has been commanded knows where to go [s]; minus infinity if none has been."""
+        return min((course.promised for course in self.by_tool.values() if course.promised > -np.inf), default=-np.inf)
+
+    def next_begin(self) -> float:
+        """When the next waiting command begins [s]; infinity if none waits."""
+        return min((self._world.arrival(name) for name, course in self.by_tool.items() if course.waiting), default=np.inf)
+
+    def take(self, commands: list[Command], reject: Callable[[CommandError], None]) -> None:
+        """Check commands that came in together and carry them out, or let them wait.
+
+        Of those of one tool that replace each other only the last good one is carried out.
+        """
+        good = [checked for command in commands if (checked := self._checked(command, reject))]
+        last = {command.tool: k for k, command in enumerate(good) if not self._waits(command)}
+        replaced: set[str] = set()
+        # From the last to the first, so that one that cannot be carried out leaves its place to the one before.
+        for k, command in reversed(list(enumerate(good))):
+            if k <= last.get(command.tool, -1) and command.tool not in replaced and self._done(self._replace, command, reject):
+                replaced.add(command.tool)
+        for k, command in enumerate(good):
+            if k > last.get(command.tool, -1):
+                self._done(self._append, command, reject)
+        self.begin_waiting(reject)
+
+    def begin_waiting(self, reject: Callable[[CommandError], None]) -> None:
+        """Set the tools that have arrived on their way to what waits for them."""
+        for name, course in self.by_tool.items():
+            while course.waiting and self._world.resting(name):
+                try:
+                    self._world.apply(self._as_pose(course.waiting.popleft()))
+                    break
+                except CommandError as error:
+                    reject(error)
+
+    @staticmethod
+    def _done(act: Callable[[Command], None], command: Command, reject: Callable[[CommandError], None]) -> bool:
+        try:
+            act(command)
+        except CommandError as error:
+            reject(error)
+            return False
+        return True
+
+    def _checked(self, command: Command, reject: Callable[[CommandError], None]) -> Command | None:
+        try:
+            command = self._world.check(command)
+            self._check_stamp(command, self.by_tool[command.tool])
+        except CommandError as error:
+            reject(error)
+            return None
+        if command.time is not None:
+            self.by_tool[command.tool].last_stamp = command.time
+        return command
+
+    def _check_stamp(self, command: Command, course: Course) -> None:
+        now, tool, rules = self._world.time, f"tool '{command.tool}'", self.rules
+        if command.time is None:
+            if self.lockstep:
+                raise CommandError(
+                    "no_stamp", f"{tool}: in lockstep a command needs a stamp in simulated time, this one has none"
+                )
+            return
+        stamp = f"{tool}: stamp {command.time:.6f} s"
+        if command.time > now + rules.furthest:
+            raise CommandError(
+                "future",
+                f"{stamp} is more than {rules.furthest:g} s ahead of simulated time {now:.6f} s; stamps are simulated "
+                "time (use_sim_time and /clock), or zero for as soon as possible",
+            )
+        if command.time <= course.last_stamp:
+            raise CommandError("out_of_order", f"{stamp} must be later than {course.last_stamp:.6f} s, the stamp before")
+        if self.lockstep and command.time <= now + 0.5 * self._world.time_step:
+            raise CommandError("late", f"{stamp} must be later than simulated time {now:.6f} s in lockstep")
+        if command.time < now - rules.oldest:
+            raise CommandError("too_old", f"{stamp} is more than {rules.oldest:g} s behind simulated time {now:.6f} s")
+        if len(course.waiting) >= _MOST_WAITING:
+            raise CommandError("flooded", f"{tool}: {_MOST_WAITING} commands are waiting already")
+
+    def _waits(self, command: Command) -> bool:
+        """Whether it is reached at its own time; poses only, outside lockstep."""
+        if self.lockstep:
+            return True
+        return isinstance(command, ToolPose) and command.time is not None and command.time > self._world.time
+
+    def _append(self, command: Command) -> None:
+        course, now = self.by_tool[command.tool], self._world.time
+        if self.lockstep or course.promised > now:
+            course.waiting.append(command)
+        else:
+            self._world.apply(command)  # what is under way has no time of its own to keep to
+        course.promised, course.last_taken = command.time, now
+
+    def _replace(self, command: Command) -> None:
+        course, now, rules = self.by_tool[command.tool], self._world.time, self.rules
+        if isinstance(command, ToolVelocity):
+            target, interval = self._pose_within_reach(command, rules.hold), rules.hold
+        else:
+            since = now - course.last_taken if command.time is None else command.time - course.followed_stamp
+            target, interval = command, max(min(since, rules.gap), self._world.time_step)
+        soonest = self._world.travel(target) / self._world.scene.tool(command.tool).max_speed
+        self._world.apply(replace(target, time=now + max(interval, soonest)))
+        self.limited += soonest > 1.000001 * interval
+        course.waiting.clear()
+        course.promised, course.last_taken = -np.inf, now
+        if command.time is None:
+            course.last_stamp = min(course.last_stamp, now)  # later ones have been discarded
+        else:
+            course.followed_stamp = command.time
+
+    def _pose_within_reach(self, velocity: ToolVelocity, duration: float) -> ToolPose:
+        """Where a velocity leads, made smaller in its direction if it is above ``max_speed``."""
+        target = self._world.pose_after(velocity, duration)
+        excess = self._world.travel(target) / (duration * self._world.scene.tool(velocity.tool).max_speed)
+        if excess <= 1.0:
+            return target
+        self.limited += 1
+        return self._world.pose_after(
+            replace(velocity, linear=velocity.linear / excess, angular=velocity.angular / excess), duration
+        )
+
+    def _as_pose(self, command: Command) -> ToolPose:
+        if isinstance(command, ToolPose):
+            return command
+        return replace(self._world.pose_after(command, command.time - self._world.time), time=command.time)

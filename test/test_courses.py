@@ -1,0 +1,170 @@
+"""Which commands are taken, and where they lead a tool."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from scenes import write_small_scene
+
+from sand_sim import ToolPose, World, load_scene, rotation
+from sand_sim.border import ToolVelocity
+from sand_sim.courses import Courses, StampRules
+
+START = np.array([0.015, 0.015, 0.06])
+NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+class Driven:
+    """A world whose tool follows its course, stepped by hand."""
+
+    def __init__(self, folder, lockstep=False, **rules):
+        self.world = World(load_scene(write_small_scene(folder)))
+        self.courses = Courses(self.world, lockstep, StampRules(**rules))
+        self.rejected, self.messages = Counter(), []
+
+    def reject(self, error):
+        self.rejected[error.reason] += 1
+        self.messages.append(str(error))
+
+    def take(self, *commands):
+        self.courses.take(list(commands), self.reject)
+
+    def go_to(self, time):
+        while self.world.time < time - 0.5 * self.world.time_step:
+            self.courses.begin_waiting(self.reject)
+            until = min(time, self.courses.next_begin())
+            self.world.step(max(1, round((until - self.world.time) / self.world.time_step)))
+
+    @property
+    def tool(self):
+        return self.world.observe().tools[0]
+
+
+@pytest.fixture
+def driven(tmp_path):
+    return Driven(tmp_path)
+
+
+def pose(height, at=None, orientation=NO_TURN):
+    return ToolPose("plate", START + [0.0, 0.0, height], orientation, at)
+
+
+def velocity(linear, angular=(0.0, 0.0, 0.0), in_tool_frame=False, at=None):
+    return ToolVelocity("plate", np.array(linear), np.array(angular), in_tool_frame, at)
+
+
+@pytest.mark.parametrize(
+    ("commands", "reason"),
+    [
+        ([pose(0.0, 100.0)], "future"),
+        ([pose(0.0, 1.8e9)], "future"),  # the wall clock
+        ([pose(0.0, 0.3)], "too_old"),
+        ([pose(0.0, 1.02), pose(0.0, 1.01)], "out_of_order"),
+        ([pose(0.0, 1.02), pose(0.0, 1.02)], "out_of_order"),
+        ([pose(0.0, 0.95), pose(0.0, 0.94)], "out_of_order"),
+        ([pose(0.4, 1.02)], "too_fast"),
+        ([velocity((np.inf, 0.0, 0.0))], "not_finite"),
+        ([velocity((0.0, 0.0, 0.0), (0.0, 0.0, 100.0))], "too_fast"),
+    ],
+)
+def test_stamps_that_break_the_rules_are_refused(driven, commands, reason):
+    driven.go_to(1.0)
+    driven.take(*commands)
+    assert driven.rejected == {reason: 1}
+    assert "tool 'plate'" in driven.messages[0]
+    driven.go_to(1.05)
+    assert driven.tool.position == pytest.approx(START, abs=1e-12)
+
+
+def test_limits_can_be_set(tmp_path):
+    driven = Driven(tmp_path, oldest=0.1, furthest=0.5)
+    driven.go_to(0.3)
+    driven.take(pose(0.0, 0.19), pose(0.0, 0.81))
+    assert driven.rejected == {"too_old": 1, "future": 1}
+    driven.take(pose(0.0, 0.21), pose(0.0, 0.79))
+    assert driven.rejected.total() == 2
+
+
+def test_poses_ahead_of_time_are_passed_one_by_one(driven):
+    """All of a path sent at once: the tool is at each of its poses at its time."""
+    times = 0.02 * np.arange(1, 11)
+    heights = 0.01 * np.sin(20.0 * times)
+    driven.take(*(pose(height, time) for height, time in zip(heights, times, strict=True)))
+    for height, time in zip(heights, times, strict=True):
+        driven.go_to(time)
+        assert driven.tool.position[2] - START[2] == pytest.approx(height, abs=1e-5)  # 1 step of up to 0.2 m/s
+    assert not driven.rejected
+
+
+def test_a_pose_without_stamp_replaces_all_that_wait(driven):
+    driven.take(pose(0.0, 0.1), pose(0.05, 0.3))
+    driven.go_to(0.05)
+    driven.take(pose(0.01))
+    driven.go_to(0.4)
+    assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.01])
+    driven.take(pose(0.02, 0.42))
+    driven.go_to(0.42)
+    assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.02]), "stamps begin anew behind what was discarded"
+    assert not driven.rejected
+
+
+def test_a_delayed_stream_keeps_its_speed(driven):
+    """Poses measured every 20 ms that come in 50 ms late, and unevenly."""
+    sent = 0
+    for k in range(1, 60):
+        driven.go_to(0.05 + 0.005 * k)
+        while 0.02 * (sent + 1) + 0.05 + 0.004 * ((7 * sent) % 3) <= driven.world.time:
+            sent += 1
+            driven.take(pose(-0.002 * sent, 0.02 * sent))
+    assert not driven.rejected
+    assert driven.courses.limited == 0
+    assert sent > 10
+    assert driven.tool.velocity[2] == pytest.approx(-0.1, rel=0.35)
+
+
+def test_after_a_gap_a_stream_begins_gently(tmp_path):
+    driven = Driven(tmp_path, gap=0.1)
+    driven.go_to(0.5)
+    driven.take(pose(-0.01))
+    driven.go_to(0.55)
+    assert driven.tool.velocity[2] == pytest.approx(-0.1, rel=1e-3), "a hundredth of a metre within the gap's tenth of a second"
+
+
+def test_a_velocity_is_kept_for_a_while_then_the_tool_stops(tmp_path):
+    driven = Driven(tmp_path, hold=0.1)
+    driven.take(velocity((0.0, 0.0, 0.2)))
+    driven.go_to(0.05)
+    assert driven.tool.velocity == pytest.approx([0.0, 0.0, 0.2])
+    driven.take(velocity((0.0, 0.0, 0.3)))
+    driven.go_to(0.3)
+    assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.05 * 0.2 + 0.1 * 0.3], abs=3e-5)
+    assert driven.tool.velocity == pytest.approx(np.zeros(3))
+
+
+def test_a_velocity_in_the_tool_frame_turns_with_it(driven):
+    quarter = rotation.from_vector(np.array([0.0, 0.5 * np.pi, 0.0]))
+    driven.take(pose(0.1, 0.5, quarter))
+    driven.go_to(0.5)
+    driven.take(velocity((0.1, 0.0, 0.0), (1.0, 0.0, 0.0), in_tool_frame=True))
+    driven.go_to(0.6)
+    assert driven.tool.velocity == pytest.approx([0.0, 0.0, -0.1], abs=1e-6), "its x axis points down"
+    assert driven.tool.spin == pytest.approx([0.0, 0.0, -1.0], abs=1e-6)
+
+
+def test_a_velocity_beyond_the_limit_is_slowed_and_counted(driven):
+    driven.take(velocity((3.0, 0.0, 4.0)))
+    driven.go_to(0.1)
+    assert driven.tool.velocity == pytest.approx([0.6, 0.0, 0.8], rel=1e-6), "max_speed is 1 m/s"
+    assert driven.courses.limited == 1
+    driven.go_to(0.3)
+    assert driven.tool.velocity == pytest.approx(np.zeros(3)), "not longer than others"
+
+
+def test_velocities_in_lockstep_last_until_their_stamps(tmp_path):
+    driven = Driven(tmp_path, lockstep=True)
+    driven.take(velocity((0.1, 0.0, 0.0), at=0.1), velocity((0.0, 0.0, 0.1), at=0.3))
+    assert driven.courses.promised == 0.3
+    driven.go_to(0.3)
+    assert driven.tool.position == pytest.approx(START + [0.01, 0.0, 0.02], abs=2e-5)
+    driven.take(velocity((0.1, 0.0, 0.0)), velocity((0.1, 0.0, 0.0), at=0.3))
+    assert driven.rejected == {"no_stamp": 1, "out_of_order": 1}
