@@ -98,6 +98,40 @@ class ToolReport:
 
 
 @dataclass(frozen=True)
+class ToolContacts:
+    """All contacts that act on a tool now, one row each; the sums are the tool's force and torque at this moment.
+
+    Attributes:
+        tool: name.
+        origin: of the tool's frame, about which torques are meant, shape (3,) [m].
+        point: where the contact is, world frame, shape (n, 3) [m].
+        normal: unit vector from the tool into the grain, world frame, shape (n, 3) [1].
+        force: of the grain on the tool, world frame, shape (n, 3) [N].
+        couple: of rolling and twisting resistance on the tool, world frame, zero without, shape (n, 3) [N m].
+        overlap: negative where a liquid bridge acts across a gap, shape (n,) [m].
+        identity: of the grain, as in ``GrainCloud``, shape (n,) [1].
+    """
+
+    tool: str
+    origin: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+    force: np.ndarray
+    couple: np.ndarray
+    overlap: np.ndarray
+    identity: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.identity)
+
+    @property
+    def wrench(self) -> np.ndarray:
+        """Sum of the forces, and torque about ``origin``, world frame, shape (2, 3) [N], [N m]."""
+        torque = np.cross(self.point - self.origin, self.force) + self.couple
+        return np.array([self.force.sum(axis=0), torque.sum(axis=0)])
+
+
+@dataclass(frozen=True)
 class BodyReport:
     """Where a free rigid body is and how it moves.
 

@@ -7,7 +7,8 @@ import numpy as np
 from sand_sim import rotation
 from sand_sim.assemble import Assembly, assemble
 from sand_sim.beforehand import find_coarseness, find_fine_tools, find_overlap
-from sand_sim.border import CommandError, Health, Observation, ToolPose
+from sand_sim.border import CommandError, Health, Observation, ToolContacts, ToolPose
+from sand_sim.contact_reading import observe_tool_contacts
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.engine.tools import ToolTrack
 from sand_sim.integrator import VERLET
@@ -88,8 +89,7 @@ class World:
             CommandError: if the tool is unknown, or pose or time are not finite.
         """
         tool = f"tool '{command.tool}'"
-        if command.tool not in self._tool_index:
-            raise CommandError("unknown_tool", f"{tool} is unknown; known are {', '.join(self._tool_index) or 'none'}")
+        self._index_of(command.tool)
         position, orientation = np.asarray(command.position, float), np.asarray(command.orientation, float)
         numbers = np.concatenate([position, orientation, [command.time or 0.0]])
         if not np.all(np.isfinite(numbers)):
@@ -167,6 +167,21 @@ class World:
         reports = observe_tools(self.assembly, self._tracks, cloud, self.time, self._mean_wrenches(steps))
         bodies = observe_bodies(self.assembly, cloud)
         return Observation(self.time, steps, cloud, reports, observe_walls(self.assembly), health, bodies, spheres)
+
+    def tool_contacts(self, tool: str) -> ToolContacts:
+        """Every contact of a tool with grains now, with its force; read when asked for, so that no frame pays for it.
+
+        Raises:
+            CommandError: if the tool is unknown.
+        """
+        self._index_of(tool)
+        self._health()
+        return observe_tool_contacts(self.assembly, tool)
+
+    def _index_of(self, tool: str) -> int:
+        if tool not in self._tool_index:
+            raise CommandError("unknown_tool", f"tool '{tool}' is unknown; known are {', '.join(self._tool_index) or 'none'}")
+        return self._tool_index[tool]
 
     def _mean_wrenches(self, steps: int) -> np.ndarray | None:
         """Mean wrenches on the tools since the last observation, those of now if no time has passed."""
