@@ -69,6 +69,21 @@ class GrainCloud:
 
 
 @dataclass(frozen=True)
+class HeightMap:
+    """Heights of the bed over the middles of level, square cells.
+
+    Attributes:
+        low: lower corner of the grid, x and y, shape (2,) [m]; the first cell's middle is half a cell further.
+        cell: edge of a cell [m].
+        heights: rows along y, columns along x, float32, shape (rows, columns) [m]; NaN where nothing is known.
+    """
+
+    low: np.ndarray
+    cell: float
+    heights: np.ndarray
+
+
+@dataclass(frozen=True)
 class ToolReport:
     """What a tool does and feels.
 

@@ -8,7 +8,6 @@ from sand_sim import rotation
 from sand_sim.assemble import Assembly
 from sand_sim.border import BodyReport, GrainCloud, Health, ToolReport, WallReport
 from sand_sim.integrator import VERLET
-from sand_sim.tool_model import ToolModel
 from sand_sim.track import Track
 from sand_sim.trust import find_doubts
 
@@ -153,7 +152,7 @@ def observe_tools(
                 torque=rotation.rotate(back, torque),
                 world_force=force.copy(),
                 work=float(work[index]),
-                carried=_mass_inside(cloud, model, position, back),
+                carried=float(cloud.mass[model.holds(cloud.position, position, orientation)].sum()),
             )
         )
     return tuple(reports)
@@ -259,10 +258,3 @@ def observe_health(assembly: Assembly, start: StartEnergy, beforehand: tuple[str
     )
     safe_now = np.inf if sums.fastest <= chosen.speed else assembly.safe_step(sums.fastest, 0.0)
     return find_doubts(health, safe_now, beforehand)
-
-
-def _mass_inside(cloud: GrainCloud, model: ToolModel, position: np.ndarray, back: np.ndarray) -> float:
-    low, high = model.mesh.bounds
-    near = np.linalg.norm(cloud.position - position, axis=1) < model.extent
-    local = rotation.rotate(back, cloud.position[near] - position)
-    return float(cloud.mass[near][np.all((local > low) & (local < high), axis=1)].sum())
