@@ -10,7 +10,7 @@ _AT_ONCE = 1 << 20  # cells that spheres may cover in one go, which bounds the m
 
 
 def footprint_grid(low: np.ndarray, high: np.ndarray, cell: float) -> tuple[np.ndarray, tuple[int, int]]:
-    """Grid of whole cells over a rectangle and around the same middle.
+    """Grid of whole cells over a rectangle, to a thousandth of a cell, and around the same middle.
 
     Args:
         low: corner of the rectangle, x and y first, shape (2,) or (3,) [m].
@@ -26,7 +26,7 @@ def footprint_grid(low: np.ndarray, high: np.ndarray, cell: float) -> tuple[np.n
     if not cell > 0.0:
         raise ValueError(f"cell: must be positive, not {cell}")
     low, high = np.asarray(low, float)[:2], np.asarray(high, float)[:2]
-    columns, rows = (max(1, ceil(edge / cell - 1e-9)) for edge in high - low)
+    columns, rows = (max(1, ceil(edge / cell - 1e-3)) for edge in high - low)
     return 0.5 * (low + high) - 0.5 * cell * np.array([columns, rows]), (rows, columns)
 
 

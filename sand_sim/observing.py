@@ -120,7 +120,7 @@ def observe_bodies(assembly: Assembly, cloud: GrainCloud) -> tuple[BodyReport, .
 
 
 def observe_tools(
-    assembly: Assembly, tracks: list[Track], cloud: GrainCloud, time: float, means: np.ndarray
+    assembly: Assembly, tracks: list[Track], cloud: GrainCloud, time: float, means: np.ndarray, swept: np.ndarray
 ) -> tuple[ToolReport, ...]:
     """Reports of all tools.
 
@@ -130,6 +130,7 @@ def observe_tools(
         cloud: the grains now.
         time: now [s].
         means: force and torque on each tool since the last observation, world frame, shape (tools, 2, 3) [N], [N m].
+        swept: volume that each tool has swept, shape (tools,) [m^3].
     """
     tools = assembly.solver.arrays.tools
     if tools is None:
@@ -153,6 +154,7 @@ def observe_tools(
                 world_force=force.copy(),
                 work=float(work[index]),
                 carried=float(cloud.mass[model.holds(cloud.position, position, orientation)].sum()),
+                swept=float(swept[index]),
             )
         )
     return tuple(reports)

@@ -23,6 +23,7 @@ from sand_sim.observing import (
     start_energy,
 )
 from sand_sim.scene.types import Scene, SceneError
+from sand_sim.sweeping import SweptGround
 from sand_sim.tool_model import Progress, ToolModel
 from sand_sim.track import Track
 from sand_sim.trust import BLOWN_UP, GAINED, gained_share
@@ -59,6 +60,8 @@ class World:
         self._start = start_energy(self.assembly)
         tools = self._solver.arrays.tools
         self._observed_steps, self._observed_wrench = 0, tools.wrench.numpy().copy() if tools else None
+        spheres, poses = observe_spheres(self.assembly), [track.at(0.0) for track in self._tracks]
+        self._swept = SweptGround(spheres, self.assembly.tools, poses)
         self._initial = self.save()
         self.reset()
 
@@ -121,6 +124,7 @@ class World:
                 "command nearer poses or later times, or raise max_speed in the scene",
             )
         track = Track(now, end, begin_position, command.position, begin_orientation, command.orientation)
+        self._swept.pass_by(index, begin_position, begin_orientation)
         self._set_tracks([*self._tracks[:index], track, *self._tracks[index + 1 :]])
 
     def travel(self, command: ToolPose) -> float:
@@ -164,7 +168,7 @@ class World:
         steps, health = self._solver.steps_done, self._health()
         spheres = observe_spheres(self.assembly)
         cloud = observe_grains(self.assembly, spheres)
-        reports = observe_tools(self.assembly, self._tracks, cloud, self.time, self._mean_wrenches(steps))
+        reports = observe_tools(self.assembly, self._tracks, cloud, self.time, self._mean_wrenches(steps), self._sweep())
         bodies = observe_bodies(self.assembly, cloud)
         return Observation(self.time, steps, cloud, reports, observe_walls(self.assembly), health, bodies, spheres)
 
@@ -182,6 +186,10 @@ class World:
         if tool not in self._tool_index:
             raise CommandError("unknown_tool", f"tool '{tool}' is unknown; known are {', '.join(self._tool_index) or 'none'}")
         return self._tool_index[tool]
+
+    def _sweep(self) -> np.ndarray:
+        """Volumes swept by the tools up to now, shape (tools,) [m^3]."""
+        return self._swept.advance([track.at(self.time) for track in self._tracks])
 
     def _mean_wrenches(self, steps: int) -> np.ndarray | None:
         """Mean wrenches on the tools since the last observation, those of now if no time has passed."""
@@ -209,6 +217,8 @@ class World:
         state = self._solver.take_state()
         for name in Track.__dataclass_fields__:
             state[f"track.{name}"] = np.array([getattr(track, name) for track in self._tracks])
+        self._sweep()
+        state |= self._swept.save()
         state["start"] = np.array(astuple(self._start))
         state["observed_steps"] = np.array(self._observed_steps)
         if self._observed_wrench is not None:
@@ -220,6 +230,7 @@ class World:
         self._solver.put_state(state)
         columns = [state[f"track.{name}"] for name in Track.__dataclass_fields__]
         self._tracks = [Track(*values) for values in zip(*columns, strict=True)]
+        self._swept.restore(state)
         self._start = StartEnergy(*(float(value) for value in state["start"]))
         self._observed_steps, self._observed_wrench = int(state["observed_steps"]), state.get("observed_wrench")
         self._measured: tuple[int, Health] | None = None
