@@ -8,7 +8,7 @@ from sand_sim.border import GrainCloud
 from sand_sim.height_map import footprint_grid, make_height_map
 from sand_sim.tool_model import ToolModel
 
-_FINEST = 0.05  # of a cell: how near to the tool's path cells are still told apart
+_FINEST = 0.25  # of a cell, at most a particle's radius: what a middle that grazes a tool may cut off unseen
 _PARTS = 4  # along the edge of a cell, over which its height is averaged
 
 
@@ -116,7 +116,7 @@ class SweptGround:
             distance = np.linalg.norm(closest - local, axis=1)
             hit = (face >= 0) & (distance <= radius)
             self.swept[index][tuple(cells[hit].T)] = True
-            share += np.maximum(distance - radius, _FINEST * self.cell) / length
+            share += np.maximum(distance - radius, min(_FINEST * self.cell, radius)) / length
             left = (face >= 0) & ~hit & (share <= 1.0)
             cells, middles, length, share = cells[left], middles[left], length[left], share[left]
 
