@@ -4,19 +4,11 @@ import time
 
 import numpy as np
 import pytest
+from clouds import cloud_of
 from scenes import write_small_scene
 
 from sand_sim import World, load_scene
-from sand_sim.border import GrainCloud
 from sand_sim.height_map import bed_grid, footprint_grid, make_height_map
-
-
-def cloud_of(position, radius):
-    position = np.atleast_2d(np.asarray(position, float))
-    number = len(position)
-    radius = np.broadcast_to(np.asarray(radius, np.float32), number)
-    still = np.zeros((number, 3), np.float32)
-    return GrainCloud(np.arange(number), position, still, still, radius, radius, np.tile([0.0, 0.0, 0.0, 1.0], (number, 1)))
 
 
 def slow_heights(cloud, low, cell, shape):

@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 import trimesh
+from clouds import cloud_of
 from scenes import write_small_scene
-from test_height_map import cloud_of
 
 from sampler import sample_body
 from sand_sim import ToolPose, World, load_scene, rotation
