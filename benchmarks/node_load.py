@@ -201,9 +201,9 @@ class _Client:
 
     def pause(self, paused: bool) -> None:
         """Hold the node, until the frame it is in is over, or let it go on."""
-        from std_srvs.srv import SetBool
+        from std_srvs.srv import Trigger
 
-        self._call(SetBool, "pause", SetBool.Request(data=paused))
+        self._call(Trigger, "pause" if paused else "resume", Trigger.Request())
         heard = -1
         while paused and heard != len(self._clocks):
             heard = len(self._clocks)

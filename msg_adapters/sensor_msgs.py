@@ -1,51 +1,94 @@
-"""``sensor_msgs``: the grains as a point cloud."""
+"""``sensor_msgs``: grains and contacts as point clouds, heights as an image."""
 
 import array
 
 import numpy as np
-from sensor_msgs.msg import PointCloud2, PointField
+from sensor_msgs.msg import Image, PointCloud2, PointField
 
 from msg_adapters.builtin_interfaces import time_to_stamp
 from sand_sim.border import GrainCloud
 
-POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("radius", "<f4"), ("speed", "<f4"), ("id", "<u4")])
 _TYPES = {"<f4": PointField.FLOAT32, "<u4": PointField.UINT32}
-_FIELDS = [
-    PointField(name=name, offset=offset, datatype=_TYPES[kind.str], count=1) for name, (kind, offset) in POINT.fields.items()
-]
+_KINDS = {number: kind for kind, number in _TYPES.items()}
+_COLUMNS = {
+    "x": lambda grains: grains.position[:, 0],
+    "y": lambda grains: grains.position[:, 1],
+    "z": lambda grains: grains.position[:, 2],
+    "radius": lambda grains: grains.radius,
+    "speed": lambda grains: grains.speed,
+    "id": lambda grains: grains.identity.astype("<u4"),
+    "vx": lambda grains: grains.velocity[:, 0],
+    "vy": lambda grains: grains.velocity[:, 1],
+    "vz": lambda grains: grains.velocity[:, 2],
+    "mass": lambda grains: grains.mass,
+}
+POINT_FIELDS = tuple(_COLUMNS)
+USUAL_FIELDS = ("x", "y", "z", "radius", "speed", "id")
 
 
-def grains_to_cloud(grains: GrainCloud, time: float, frame_id: str, decimation: int = 1) -> PointCloud2:
-    """Grains to a cloud with the fields x y z [m], radius [m], speed [m/s] and id.
+def grains_to_cloud(grains: GrainCloud, time: float, frame_id: str, fields: tuple[str, ...] = USUAL_FIELDS) -> PointCloud2:
+    """Grains to a cloud, in single precision.
 
     Args:
         grains: all grains.
         time: of the observation [s].
         frame_id: of the world frame.
-        decimation: keep the grains whose id is a multiple of this.
+        fields: some of ``POINT_FIELDS``: x y z [m], radius [m], speed [m/s], id, vx vy vz [m/s], mass [kg].
     """
-    kept = grains.identity % decimation == 0
-    points = np.empty(int(kept.sum()), POINT)
-    for k, name in enumerate("xyz"):
-        points[name] = grains.position[kept, k]
-    points["radius"], points["speed"], points["id"] = grains.radius[kept], grains.speed[kept], grains.identity[kept]
-    message = PointCloud2(
-        height=1,
-        width=len(points),
-        fields=_FIELDS,
-        is_bigendian=False,
-        point_step=POINT.itemsize,
-        row_step=POINT.itemsize * len(points),
-        is_dense=True,
-    )
+    return columns_to_cloud({name: _COLUMNS[name](grains) for name in fields}, time, frame_id)
+
+
+def columns_to_cloud(columns: dict[str, np.ndarray], time: float, frame_id: str) -> PointCloud2:
+    """Columns of equal length, shape (n,) each, to a cloud: uint32 as they are, all else in single precision.
+
+    Args:
+        columns: by the names of the fields.
+        time: [s].
+        frame_id: of the frame that positions are in.
+    """
+    kinds = {name: "<u4" if column.dtype == np.uint32 else "<f4" for name, column in columns.items()}
+    points = np.empty(len(next(iter(columns.values()))), list(kinds.items()))
+    for name, column in columns.items():
+        points[name] = column
+    size = points.dtype.itemsize
+    fields = [
+        PointField(name=name, offset=offset, datatype=_TYPES[kind.str], count=1)
+        for name, (kind, offset) in points.dtype.fields.items()
+    ]
+    message = PointCloud2(height=1, width=len(points), fields=fields, is_bigendian=False, is_dense=True)
+    message.point_step, message.row_step = size, size * len(points)
     message.header.stamp, message.header.frame_id = time_to_stamp(time), frame_id
-    # Assigning bytes or a NumPy array makes rclpy copy byte by byte, hundreds of times slower than this.
-    data = array.array("B")
-    data.frombytes(points.view(np.uint8))
-    message.data = data
+    message.data = _bytes_of(points)
     return message
 
 
 def cloud_to_points(message: PointCloud2) -> np.ndarray:
-    """A cloud made by ``grains_to_cloud`` to a structured array with the fields of ``POINT``, shape (n,)."""
-    return np.frombuffer(message.data, POINT)
+    """A cloud made here to a structured array with its fields, shape (n,)."""
+    return np.frombuffer(message.data, [(field.name, _KINDS[field.datatype]) for field in message.fields])
+
+
+def heights_to_image(heights: np.ndarray, time: float, frame_id: str) -> Image:
+    """Heights to an image of single-precision metres, not a number where there is no grain.
+
+    Args:
+        heights: shape (rows along y, columns along x) [m]; the first row is the one with the least y.
+        time: of the observation [s].
+        frame_id: of the world frame.
+    """
+    rows, columns = heights.shape
+    message = Image(height=rows, width=columns, encoding="32FC1", is_bigendian=0, step=4 * columns)
+    message.header.stamp, message.header.frame_id = time_to_stamp(time), frame_id
+    message.data = _bytes_of(np.ascontiguousarray(heights, "<f4"))
+    return message
+
+
+def image_to_heights(message: Image) -> np.ndarray:
+    """An image made by ``heights_to_image`` to heights, shape (rows, columns) [m]."""
+    return np.frombuffer(message.data, "<f4").reshape(message.height, message.width)
+
+
+def _bytes_of(values: np.ndarray) -> array.array:
+    # Assigning bytes or a NumPy array makes rclpy copy byte by byte, hundreds of times slower than this.
+    data = array.array("B")
+    data.frombytes(values.view(np.uint8))
+    return data

@@ -57,6 +57,25 @@ class ToolVelocity:
 
 
 @dataclass(frozen=True)
+class Frame:
+    """A coordinate frame in another one, as TF tells it.
+
+    Attributes:
+        name: of the frame.
+        parent: name of the frame it is given in.
+        position: of its origin, parent frame, shape (3,) [m].
+        orientation: frame to parent frame, shape (4,).
+        time: when it was there [s]; None if it always is.
+    """
+
+    name: str
+    parent: str
+    position: np.ndarray
+    orientation: np.ndarray
+    time: float | None = None
+
+
+@dataclass(frozen=True)
 class GrainCloud:
     """All grains that are in the domain, in the order of their identities.
 
@@ -88,6 +107,21 @@ class GrainCloud:
 
 
 @dataclass(frozen=True)
+class HeightMap:
+    """Heights of the bed over the middles of level, square cells.
+
+    Attributes:
+        low: lower corner of the grid, x and y, shape (2,) [m]; the first cell's middle is half a cell further.
+        cell: edge of a cell [m].
+        heights: rows along y, columns along x, float32, shape (rows, columns) [m]; NaN where nothing is known.
+    """
+
+    low: np.ndarray
+    cell: float
+    heights: np.ndarray
+
+
+@dataclass(frozen=True)
 class ToolReport:
     """What a tool does and feels.
 
@@ -102,6 +136,7 @@ class ToolReport:
         world_force: the mean force in the world frame, shape (3,) [N].
         work: of the tool on the sand since the start [J].
         carried: mass of the grains whose centres are inside the tool's bounding box [kg].
+        swept: volume of ground below the bed's first surface that the tool has passed through since the start [m^3].
     """
 
     name: str
@@ -114,6 +149,41 @@ class ToolReport:
     world_force: np.ndarray
     work: float
     carried: float
+    swept: float = 0.0
+
+
+@dataclass(frozen=True)
+class ToolContacts:
+    """All contacts that act on a tool now, one row each; the sums are the tool's force and torque at this moment.
+
+    Attributes:
+        tool: name.
+        origin: of the tool's frame, about which torques are meant, shape (3,) [m].
+        point: where the contact is, world frame, shape (n, 3) [m].
+        normal: unit vector from the tool into the grain, world frame, shape (n, 3) [1].
+        force: of the grain on the tool, world frame, shape (n, 3) [N].
+        couple: of rolling and twisting resistance on the tool, world frame, zero without, shape (n, 3) [N m].
+        overlap: negative where a liquid bridge acts across a gap, shape (n,) [m].
+        identity: of the grain, as in ``GrainCloud``, shape (n,) [1].
+    """
+
+    tool: str
+    origin: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+    force: np.ndarray
+    couple: np.ndarray
+    overlap: np.ndarray
+    identity: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.identity)
+
+    @property
+    def wrench(self) -> np.ndarray:
+        """Sum of the forces, and torque about ``origin``, world frame, shape (2, 3) [N], [N m]."""
+        torque = np.cross(self.point - self.origin, self.force) + self.couple
+        return np.array([self.force.sum(axis=0), torque.sum(axis=0)])
 
 
 @dataclass(frozen=True)

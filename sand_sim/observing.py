@@ -8,7 +8,6 @@ from sand_sim import rotation
 from sand_sim.assemble import Assembly
 from sand_sim.border import BodyReport, GrainCloud, Health, ToolReport, WallReport
 from sand_sim.integrator import VERLET
-from sand_sim.tool_model import ToolModel
 from sand_sim.track import Track
 from sand_sim.trust import find_doubts
 
@@ -121,7 +120,7 @@ def observe_bodies(assembly: Assembly, cloud: GrainCloud) -> tuple[BodyReport, .
 
 
 def observe_tools(
-    assembly: Assembly, tracks: list[Track], cloud: GrainCloud, time: float, means: np.ndarray
+    assembly: Assembly, tracks: list[Track], cloud: GrainCloud, time: float, means: np.ndarray, swept: np.ndarray
 ) -> tuple[ToolReport, ...]:
     """Reports of all tools.
 
@@ -131,6 +130,7 @@ def observe_tools(
         cloud: the grains now.
         time: now [s].
         means: force and torque on each tool since the last observation, world frame, shape (tools, 2, 3) [N], [N m].
+        swept: volume that each tool has swept, shape (tools,) [m^3].
     """
     tools = assembly.solver.arrays.tools
     if tools is None:
@@ -153,7 +153,8 @@ def observe_tools(
                 torque=rotation.rotate(back, torque),
                 world_force=force.copy(),
                 work=float(work[index]),
-                carried=_mass_inside(cloud, model, position, back),
+                carried=float(cloud.mass[model.holds(cloud.position, position, orientation)].sum()),
+                swept=float(swept[index]),
             )
         )
     return tuple(reports)
@@ -259,10 +260,3 @@ def observe_health(assembly: Assembly, start: StartEnergy, beforehand: tuple[str
     )
     safe_now = np.inf if sums.fastest <= chosen.speed else assembly.safe_step(sums.fastest, 0.0)
     return find_doubts(health, safe_now, beforehand)
-
-
-def _mass_inside(cloud: GrainCloud, model: ToolModel, position: np.ndarray, back: np.ndarray) -> float:
-    low, high = model.mesh.bounds
-    near = np.linalg.norm(cloud.position - position, axis=1) < model.extent
-    local = rotation.rotate(back, cloud.position[near] - position)
-    return float(cloud.mass[near][np.all((local > low) & (local < high), axis=1)].sum())

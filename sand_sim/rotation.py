@@ -36,6 +36,19 @@ def from_vector(vector: np.ndarray) -> np.ndarray:
     return np.append(np.asarray(vector) / angle * np.sin(0.5 * angle), np.cos(0.5 * angle))
 
 
+def from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """Fixed-axis roll, pitch, yaw [rad] (REP-103), shape (4,)."""
+    cr, sr, cp, sp, cy, sy = (f(a / 2.0) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
+    return np.array(
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ]
+    )
+
+
 def to_vector(q: np.ndarray) -> np.ndarray:
     """Axis times angle [rad] of the shorter way round, shape (3,)."""
     q = np.asarray(q, float) if q[3] >= 0.0 else -np.asarray(q, float)

@@ -16,7 +16,8 @@ from concurrent.futures import Future
 from typing import Any
 
 from sand_sim.border import CommandError, Observation
-from sand_sim.courses import USUAL, Command, Courses, StampRules
+from sand_sim.commands import Command
+from sand_sim.courses import USUAL, Courses, StampRules
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.world import World
 
@@ -47,6 +48,7 @@ class Simulation:
         fault: the error that has stopped the stepping, None while all is well.
         rejected: number of rejected commands by reason.
         last_rejection: message of the last rejected command.
+        step_time: wall time of a step, mean of the last few [s].
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class Simulation:
         self.fault: Exception | None = None
         self.rejected: Counter[str] = Counter()
         self.last_rejection = ""
+        self.step_time = 0.0
         self._on_frame, self._on_fault, self._on_reject = on_frame, on_fault, on_reject
         self._wake = threading.Condition()
         self._inbox: deque[Command] = deque()
@@ -219,7 +222,9 @@ class Simulation:
         while world.time < end - 0.5 * world.time_step and not self._stopping:
             self.courses.begin_waiting(self.reject)
             until = min(end, self.courses.next_begin())
-            world.step(max(1, round((until - world.time) / world.time_step)))
+            steps, begin = max(1, round((until - world.time) / world.time_step)), time.perf_counter()
+            world.step(steps)
+            self.step_time = (time.perf_counter() - begin) / steps
         if not self._stopping:
             if world.time > self._frame_end - 0.5 * world.time_step:
                 self._frame_end = world.time + self.frame

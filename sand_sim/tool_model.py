@@ -35,6 +35,14 @@ class ToolModel:
         corners = np.asarray(pose.position) + rotation.rotate(np.asarray(pose.orientation), np.asarray(self.mesh.vertices))
         return corners.min(axis=0) - self.body.radius, corners.max(axis=0) + self.body.radius
 
+    def holds(self, points: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+        """Whether world points, shape (n, 3), are inside the mesh's bounding box at a pose of the tool, shape (n,)."""
+        low, high = self.mesh.bounds
+        inside = np.linalg.norm(points - position, axis=1) < self.extent
+        local = rotation.rotate(rotation.inverse(orientation), points[inside] - position)
+        inside[inside] = np.all((local > low) & (local < high), axis=1)
+        return inside
+
     def distance(self, position: np.ndarray) -> np.ndarray:
         """Distance of world points, shape (n, 3), from the particles' hull at the initial pose, shape (n,) [m]."""
         pose = self.tool.pose

@@ -1,13 +1,15 @@
 """A running world: commands in, steps, observations out."""
 
-from dataclasses import astuple, replace
+from dataclasses import astuple
 
 import numpy as np
 
 from sand_sim import rotation
 from sand_sim.assemble import Assembly, assemble
 from sand_sim.beforehand import find_coarseness, find_fine_tools, find_overlap
-from sand_sim.border import CommandError, Health, Observation, ToolPose, ToolVelocity
+from sand_sim.border import CommandError, Health, Observation, ToolContacts, ToolPose, ToolVelocity
+from sand_sim.commands import Command, check_command, pose_after
+from sand_sim.contact_reading import observe_tool_contacts
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.engine.tools import ToolTrack
 from sand_sim.integrator import VERLET
@@ -22,6 +24,7 @@ from sand_sim.observing import (
     start_energy,
 )
 from sand_sim.scene.types import Scene, SceneError
+from sand_sim.sweeping import SweptGround
 from sand_sim.tool_model import Progress, ToolModel
 from sand_sim.track import Track
 from sand_sim.trust import BLOWN_UP, GAINED, gained_share
@@ -58,6 +61,8 @@ class World:
         self._start = start_energy(self.assembly)
         tools = self._solver.arrays.tools
         self._observed_steps, self._observed_wrench = 0, tools.wrench.numpy().copy() if tools else None
+        spheres, poses = observe_spheres(self.assembly), [track.at(0.0) for track in self._tracks]
+        self._swept = SweptGround(spheres, self.assembly.tools, poses)
         self._initial = self.save()
         self.reset()
 
@@ -81,26 +86,13 @@ class World:
         """Tools with their meshes and particles, in the order of the scene."""
         return self.assembly.tools
 
-    def check(self, command: ToolPose | ToolVelocity) -> ToolPose | ToolVelocity:
+    def check(self, command: Command) -> Command:
         """See that a command makes sense by itself, and bring its orientation to length one.
 
         Raises:
             CommandError: if the tool is unknown, or pose, velocity or time are not finite.
         """
-        tool = f"tool '{command.tool}'"
-        if command.tool not in self._tool_index:
-            raise CommandError("unknown_tool", f"{tool} is unknown; known are {', '.join(self._tool_index) or 'none'}")
-        moving = isinstance(command, ToolVelocity)
-        names = ("linear", "angular") if moving else ("position", "orientation")
-        values = {name: np.asarray(getattr(command, name), float) for name in names}
-        if not np.all(np.isfinite(np.concatenate([*values.values(), [command.time or 0.0]]))):
-            raise CommandError("not_finite", f"{tool}: {names[0]}, {names[1]} and time must be finite")
-        if not moving:
-            length = float(np.linalg.norm(values["orientation"]))
-            if length < 1e-6:
-                raise CommandError("zero_quaternion", f"{tool}: orientation is the zero quaternion; (0, 0, 0, 1) is no rotation")
-            values["orientation"] = values["orientation"] / length
-        return replace(command, **values)
+        return check_command(command, self._tool_index)
 
     def pose_after(self, velocity: ToolVelocity, duration: float) -> ToolPose:
         """Where a velocity leads a tool from where it is, in a time [s].
@@ -108,15 +100,7 @@ class World:
         Raises:
             CommandError: as ``check``, and if it is half a turn or more.
         """
-        velocity = self.check(velocity)
-        linear, angular = velocity.linear, velocity.angular
-        position, orientation = self._tracks[self._tool_index[velocity.tool]].at(self.time)
-        if velocity.in_tool_frame:
-            linear, angular = rotation.rotate(orientation, linear), rotation.rotate(orientation, angular)
-        if not np.linalg.norm(angular) * duration < np.pi:
-            raise CommandError("too_fast", f"tool '{velocity.tool}': angular velocity makes half a turn within {duration:.3g} s")
-        turned = rotation.multiply(rotation.from_vector(angular * duration), orientation)
-        return ToolPose(velocity.tool, position + linear * duration, turned)
+        return pose_after(self.check(velocity), *self._tracks[self._tool_index[velocity.tool]].at(self.time), duration)
 
     def apply(self, command: ToolPose) -> None:
         """Set a tool on its way to a pose; without a time it gets there as fast as it may.
@@ -140,6 +124,7 @@ class World:
                 "command nearer poses or later times, or raise max_speed in the scene",
             )
         track = Track(now, end, begin_position, command.position, begin_orientation, command.orientation)
+        self._swept.pass_by(index, begin_position, begin_orientation)
         self._set_tracks([*self._tracks[:index], track, *self._tracks[index + 1 :]])
 
     def travel(self, command: ToolPose) -> float:
@@ -183,9 +168,28 @@ class World:
         steps, health = self._solver.steps_done, self._health()
         spheres = observe_spheres(self.assembly)
         cloud = observe_grains(self.assembly, spheres)
-        reports = observe_tools(self.assembly, self._tracks, cloud, self.time, self._mean_wrenches(steps))
+        reports = observe_tools(self.assembly, self._tracks, cloud, self.time, self._mean_wrenches(steps), self._sweep())
         bodies = observe_bodies(self.assembly, cloud)
         return Observation(self.time, steps, cloud, reports, observe_walls(self.assembly), health, bodies, spheres)
+
+    def tool_contacts(self, tool: str) -> ToolContacts:
+        """Every contact of a tool with grains now, with its force; read when asked for, so that no frame pays for it.
+
+        Raises:
+            CommandError: if the tool is unknown.
+        """
+        self._index_of(tool)
+        self._health()
+        return observe_tool_contacts(self.assembly, tool)
+
+    def _index_of(self, tool: str) -> int:
+        if tool not in self._tool_index:
+            raise CommandError("unknown_tool", f"tool '{tool}' is unknown; known are {', '.join(self._tool_index) or 'none'}")
+        return self._tool_index[tool]
+
+    def _sweep(self) -> np.ndarray:
+        """Volumes swept by the tools up to now, shape (tools,) [m^3]."""
+        return self._swept.advance([track.at(self.time) for track in self._tracks])
 
     def _mean_wrenches(self, steps: int) -> np.ndarray | None:
         """Mean wrenches on the tools since the last observation, those of now if no time has passed."""
@@ -213,6 +217,8 @@ class World:
         state = self._solver.take_state()
         for name in Track.__dataclass_fields__:
             state[f"track.{name}"] = np.array([getattr(track, name) for track in self._tracks])
+        self._sweep()
+        state |= self._swept.save()
         state["start"] = np.array(astuple(self._start))
         state["observed_steps"] = np.array(self._observed_steps)
         if self._observed_wrench is not None:
@@ -224,6 +230,7 @@ class World:
         self._solver.put_state(state)
         columns = [state[f"track.{name}"] for name in Track.__dataclass_fields__]
         self._tracks = [Track(*values) for values in zip(*columns, strict=True)]
+        self._swept.restore(state)
         self._start = StartEnergy(*(float(value) for value in state["start"]))
         self._observed_steps, self._observed_wrench = int(state["observed_steps"]), state.get("observed_wrench")
         self._measured: tuple[int, Health] | None = None

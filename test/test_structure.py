@@ -21,10 +21,15 @@ ROS = {
     "builtin_interfaces",
     "diagnostic_msgs",
     "geometry_msgs",
+    "lifecycle_msgs",
+    "nav_msgs",
     "rcl_interfaces",
     "rosgraph_msgs",
     "sensor_msgs",
+    "std_msgs",
     "std_srvs",
+    "tf2_msgs",
+    "visualization_msgs",
 }
 # Who may import whom among the parts of sand_sim; a part may always import itself.
 BELOW = {

@@ -26,9 +26,11 @@ def main(arguments: list[str] | None = None) -> int:
         interruption.check()
         node = SandSimNode(progress=interruption.check)
         executor.add_node(node)
+        if node.parameters["autostart"]:
+            node.start()
         while not (interruption.asked or node.done):
             executor.spin_once(timeout_sec=0.1)
-        return 1 if node.simulation.fault else 0
+        return 1 if node.configured and node.simulation.fault else 0
     except (InterruptedByUserError, ExternalShutdownException):
         return 0
     except (SceneError, ValueError, ParameterException) as error:
@@ -36,7 +38,6 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     finally:
         if node is not None:
-            node.close()
             executor.shutdown()  # it holds on to what it waits for
             node.destroy_node()
         rclpy.try_shutdown()

@@ -1,12 +1,19 @@
-"""The node's parameters: one table, declared with descriptions and ranges."""
+"""The node's parameters: one table, declared with descriptions and ranges, and what may change when."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+import numpy as np
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
+from msg_adapters.sensor_msgs import POINT_FIELDS, USUAL_FIELDS
 from sand_sim.simulation import PACINGS
+
+SOURCES = ("pose", "twist", "tf")
+WRENCH_FRAMES = ("tool", "world")
 
 
 @dataclass(frozen=True)
@@ -18,8 +25,8 @@ class Declaration:
         default: gives its type, too.
         description: shown by ``ros2 param describe``.
         low, high: inclusive range of a number.
-        choices: allowed texts.
-        changeable: while the node runs.
+        choices: allowed texts, of a list for each of its entries.
+        changeable: at any time; all others only while the node is unconfigured.
     """
 
     name: str
@@ -32,15 +39,31 @@ class Declaration:
 
 
 DECLARATIONS = (
+    Declaration("autostart", True, "Configure and activate at once; otherwise wait for lifecycle transitions."),
     Declaration("scene", "dig", "Scene file, or the name of one of the package's own scenes."),
-    Declaration("pacing", "realtime", "How simulated time advances: realtime, fast or lockstep.", choices=PACINGS),
-    Declaration("real_time_factor", 1.0, "Simulated over wall seconds in realtime pacing [1].", 0.001, 1000.0),
+    Declaration("pacing", "realtime", "How simulated time advances.", choices=PACINGS, changeable=True),
+    Declaration("real_time_factor", 1.0, "Simulated over wall seconds in realtime pacing [1].", 0.001, 1000.0, changeable=True),
     Declaration("frame_id", "world", "Name of the world frame in all messages."),
+    Declaration("frame_names", [""], "Names of fixed frames that poses may be given in; each has frames.NAME.pose and .parent."),
+    Declaration("publish_clock", True, "Publish simulated time on /clock; false beside another source of it."),
+    Declaration("stamps", "simulated", "What stamps of commands mean.", choices=("simulated", "ignored")),
+    Declaration("stamp_oldest", 0.5, "How far a stamp may lie behind simulated time [s].", 0.0, 1.0e9, changeable=True),
+    Declaration("stamp_furthest", 60.0, "How far a stamp may lie ahead of simulated time [s].", 0.0, 1.0e9, changeable=True),
+    Declaration("stream_gap", 0.2, "Commands farther apart than this are two streams [s].", 1.0e-3, 1.0e9, changeable=True),
+    Declaration("velocity_hold", 0.2, "How long a velocity lasts unless the next one comes [s].", 1.0e-3, 10.0, changeable=True),
+    Declaration("wrench_cutoff", 10.0, "Cut-off of wrench_filtered [Hz] of simulated time.", 1.0e-3, 1.0e6, changeable=True),
     Declaration("points_rate", 25.0, "Point clouds per simulated second [1/s]; 0 for none.", 0.0, 1000.0, changeable=True),
     Declaration("points_decimation", 1, "Publish the grains whose id is a multiple of this [1].", 1, 1_000_000, changeable=True),
-    Declaration("paused", False, "Start held; go on with the pause service."),
-    Declaration("duration", 0.0, "End after this simulated time [s]; 0 for never.", 0.0, 1.0e9),
-    Declaration("end_on_fault", False, "End with exit code 1 when the run blows up; otherwise wait for a reset."),
+    Declaration("points_voxel", 0.0, "One grain of each cube with this edge [m]; 0 for all.", 0.0, 1.0e3, changeable=True),
+    Declaration("points_region", [0.0] * 6, "Box of the cloud: low x y z, high x y z [m]; zeros for all.", changeable=True),
+    Declaration("points_fields", list(USUAL_FIELDS), "Fields of the cloud.", choices=POINT_FIELDS, changeable=True),
+    Declaration("heights_rate", 5.0, "Height maps per simulated second [1/s]; 0 for none.", 0.0, 1000.0, changeable=True),
+    Declaration("heights_cell", 0.0, "Edge of a cell of the height map [m]; 0 for the median grain diameter.", 0.0, 1.0e3),
+    Declaration("contacts_rate", 25.0, "Contacts of tools per simulated second, if heard [1/s].", 0.0, 1000.0, changeable=True),
+    Declaration("force_scale", 0.0, "Length of force markers [m/N]; 0 chosen from the scene.", 0.0, 1.0e6, changeable=True),
+    Declaration("paused", False, "Start held; go on with the resume service."),
+    Declaration("duration", 0.0, "End after this simulated time [s]; 0 for never.", 0.0, 1.0e9, changeable=True),
+    Declaration("end_on_fault", False, "End with code 1 when the run blows up; otherwise wait for a reset.", changeable=True),
     Declaration("recording", "", "Rerun recording to write (.rrd); empty for none."),
     Declaration("view", False, "Open the Rerun viewer."),
     Declaration("particles", False, "Draw the particles of tools in Rerun."),
@@ -49,28 +72,108 @@ DECLARATIONS = (
 )
 
 
-def declare_parameters(node: Node) -> None:
-    """Declare all parameters."""
-    for declaration in DECLARATIONS:
-        descriptor = ParameterDescriptor(description=declaration.description, read_only=not declaration.changeable)
-        if declaration.choices:
-            descriptor.additional_constraints = f"One of {', '.join(declaration.choices)}."
-        if isinstance(declaration.default, float):
-            descriptor.floating_point_range = [FloatingPointRange(from_value=declaration.low, to_value=declaration.high)]
-        elif declaration.low is not None:
-            descriptor.integer_range = [IntegerRange(from_value=int(declaration.low), to_value=int(declaration.high), step=1)]
-        node.declare_parameter(declaration.name, declaration.default, descriptor)
+def tool_declarations(tool: str) -> tuple[Declaration, ...]:
+    """The parameters of one tool."""
+    return (
+        Declaration(f"tools.{tool}.source", "pose", "Topic that drives the tool.", choices=SOURCES),
+        Declaration(f"tools.{tool}.frame", tool, "Frame that is the tool's, for TF."),
+        Declaration(f"tools.{tool}.wrench_frame", "tool", "Axes of the wrench.", choices=WRENCH_FRAMES, changeable=True),
+    )
 
 
-def read_parameters(node: Node) -> dict[str, Any]:
-    """All values by name.
+def frame_declarations(frame: str) -> tuple[Declaration, ...]:
+    """The parameters of one fixed frame."""
+    return (
+        Declaration(f"frames.{frame}.pose", [0.0] * 6, "Where the frame is in its parent: x y z [m], roll pitch yaw [rad]."),
+        Declaration(f"frames.{frame}.parent", "", "Frame it is given in; empty for the world frame."),
+    )
+
+
+class Parameters(Mapping):
+    """The values of all declared parameters, kept up to date.
+
+    Args:
+        node: they are declared on; its ``configured`` tells whether what is not changeable is fixed.
 
     Raises:
-        ValueError: if a text is not among its choices; the message names the parameter.
+        ValueError: if an override is not allowed; the message names the parameter.
     """
-    values = {declaration.name: node.get_parameter(declaration.name).value for declaration in DECLARATIONS}
-    for declaration in DECLARATIONS:
-        if declaration.choices and values[declaration.name] not in declaration.choices:
-            known = ", ".join(declaration.choices)
-            raise ValueError(f"parameter {declaration.name}: unknown '{values[declaration.name]}'; known are {known}")
-    return values
+
+    def __init__(self, node: Node):
+        self._node, self._values = node, {}
+        self._declarations: dict[str, Declaration] = {}
+        node.add_on_set_parameters_callback(self._judge)
+        node.add_post_set_parameters_callback(self._keep)
+        self.declare(DECLARATIONS)
+
+    def declare(self, declarations: tuple[Declaration, ...]) -> None:
+        """Declare some more, those that are declared already excepted.
+
+        Raises:
+            ValueError: if an override is not allowed.
+        """
+        for declaration in declarations:
+            if declaration.name in self._declarations:
+                continue
+            self._declarations[declaration.name] = declaration
+            self._node.declare_parameter(declaration.name, declaration.default, _descriptor(declaration))
+            self._values[declaration.name] = self._node.get_parameter(declaration.name).value
+            if refusal := _refusal(declaration, self._values[declaration.name]):
+                raise ValueError(f"parameter {declaration.name}: {refusal}")
+
+    def __getitem__(self, name: str) -> Any:
+        return self._values[name]
+
+    def __iter__(self):
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            declaration = self._declarations.get(parameter.name)
+            if declaration is None or parameter.name not in self._values:  # somebody else's, or being declared
+                continue
+            refusal = _refusal(declaration, parameter.value)
+            if not declaration.changeable and self._node.configured:
+                refusal = "fixed while the node is configured; clean up (ros2 lifecycle set), change it, and configure again"
+            if refusal:
+                return SetParametersResult(successful=False, reason=f"{parameter.name}: {refusal}")
+        return SetParametersResult(successful=True)
+
+    def _keep(self, parameters: list[Parameter]) -> None:
+        changed = {p.name: p.value for p in parameters if p.name in self._values}
+        self._values = self._values | changed  # replaced as a whole, because the stepping thread reads it
+        if changed:
+            self._node.parameters_changed()
+
+
+def _refusal(declaration: Declaration, value: Any) -> str:
+    """Why a value is not allowed, empty if it is."""
+    entries = value if isinstance(value, list) else [value]
+    unknown = [entry for entry in entries if declaration.choices and entry not in declaration.choices]
+    if unknown:
+        return f"unknown '{unknown[0]}'; known are {', '.join(declaration.choices)}"
+    if isinstance(declaration.default, list) and isinstance(declaration.default[0], float):
+        if len(value) != len(declaration.default) or not np.all(np.isfinite(value)):
+            return f"must be {len(declaration.default)} finite numbers"
+        if declaration.name.endswith("_region") and any(value) and not np.all(np.less(value[:3], value[3:])):
+            return "each of the first three numbers must be less than its partner among the last three"
+    elif isinstance(value, float) and not np.isfinite(value):
+        return "must be finite"
+    if declaration.choices and isinstance(value, list) and (not value or len(set(value)) != len(value)):
+        return "must name something, and nothing twice"
+    return ""
+
+
+def _descriptor(declaration: Declaration) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(description=declaration.description)
+    fixed = "" if declaration.changeable else "Fixed while the node is configured."
+    choices = f"One of {', '.join(declaration.choices)}." if declaration.choices else ""
+    descriptor.additional_constraints = " ".join(filter(None, (choices, fixed)))
+    if isinstance(declaration.default, float):
+        descriptor.floating_point_range = [FloatingPointRange(from_value=declaration.low, to_value=declaration.high)]
+    elif declaration.low is not None:
+        descriptor.integer_range = [IntegerRange(from_value=int(declaration.low), to_value=int(declaration.high), step=1)]
+    return descriptor

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sand_sim import rotation
 from sand_sim.scene.fields import Field
 from sand_sim.scene.types import Pose
 
@@ -11,7 +12,7 @@ def read_pose(entry: Field) -> Pose:
     entry.keys(("position", "orientation", "rpy"))
     position = entry.optional("position", Field.vector, (0.0, 0.0, 0.0))
     if "rpy" in entry:
-        return Pose(position, _quaternion_of_rpy(*entry["rpy"].vector()))
+        return Pose(position, tuple(map(float, rotation.from_rpy(*entry["rpy"].vector()))))
     if "orientation" not in entry:
         return Pose(position)
     quaternion = np.array(entry["orientation"].vector(4))
@@ -19,14 +20,3 @@ def read_pose(entry: Field) -> Pose:
     if length < 1e-6:
         raise entry["orientation"].refuse("must not be the zero quaternion; [0, 0, 0, 1] is no rotation")
     return Pose(position, tuple(quaternion / length))
-
-
-def _quaternion_of_rpy(roll: float, pitch: float, yaw: float) -> tuple:
-    """Fixed-axis roll, pitch, yaw [rad] (REP-103) to a quaternion x y z w."""
-    cr, sr, cp, sp, cy, sy = (f(a / 2.0) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
-    return (
-        float(sr * cp * cy - cr * sp * sy),
-        float(cr * sp * cy + sr * cp * sy),
-        float(cr * cp * sy - sr * sp * cy),
-        float(cr * cp * cy + sr * sp * sy),
-    )

@@ -1,0 +1,52 @@
+"""Whether a command makes sense by itself, and where a velocity leads."""
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from sand_sim import rotation
+from sand_sim.border import CommandError, ToolPose, ToolVelocity
+
+Command = ToolPose | ToolVelocity
+
+
+def check_command(command: Command, tools: Collection[str]) -> Command:
+    """The command, its orientation brought to length one.
+
+    Args:
+        command: pose or velocity.
+        tools: known names.
+
+    Raises:
+        CommandError: if the tool is unknown, pose, velocity or time are not finite, or the quaternion is zero.
+    """
+    tool = f"tool '{command.tool}'"
+    if command.tool not in tools:
+        raise CommandError("unknown_tool", f"{tool} is unknown; known are {', '.join(tools) or 'none'}")
+    moving = isinstance(command, ToolVelocity)
+    names = ("linear", "angular") if moving else ("position", "orientation")
+    values = {name: np.asarray(getattr(command, name), float) for name in names}
+    if not np.all(np.isfinite(np.concatenate([*values.values(), [command.time or 0.0]]))):
+        raise CommandError("not_finite", f"{tool}: {names[0]}, {names[1]} and time must be finite")
+    if not moving:
+        length = float(np.linalg.norm(values["orientation"]))
+        if length < 1e-6:
+            raise CommandError("zero_quaternion", f"{tool}: orientation is the zero quaternion; (0, 0, 0, 1) is no rotation")
+        values["orientation"] = values["orientation"] / length
+    return replace(command, **values)
+
+
+def pose_after(velocity: ToolVelocity, position: np.ndarray, orientation: np.ndarray, duration: float) -> ToolPose:
+    """Where a velocity leads a tool from a pose, in a time [s].
+
+    Raises:
+        CommandError: if it is half a turn or more.
+    """
+    linear, angular = velocity.linear, velocity.angular
+    if velocity.in_tool_frame:
+        linear, angular = rotation.rotate(orientation, linear), rotation.rotate(orientation, angular)
+    if not np.linalg.norm(angular) * duration < np.pi:
+        raise CommandError("too_fast", f"tool '{velocity.tool}': angular velocity makes half a turn within {duration:.3g} s")
+    turned = rotation.multiply(rotation.from_vector(angular * duration), orientation)
+    return ToolPose(velocity.tool, position + linear * duration, turned)

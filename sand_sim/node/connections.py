@@ -1,0 +1,61 @@
+"""Publishers, subscriptions, services and timers of a configured node, which come and go together."""
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+COMMANDS_DEPTH = 100
+
+
+class Connections:
+    """Makes them with quality of service that parameters can override, and takes all of them back.
+
+    Args:
+        node: they belong to.
+    """
+
+    def __init__(self, node: Node):
+        self._node = node
+        self._undo: list[Callable[[], Any]] = []
+
+    def publisher(self, kind: type, topic: str, latched: bool = False) -> Publisher:
+        """Reliable, keep last 5, volatile unless latched."""
+        made = self._node.create_publisher(kind, topic, _quality(1 if latched else 5, latched), **_overridable())
+        self._undo.append(lambda: self._node.destroy_publisher(made))
+        return made
+
+    def subscription(self, kind: type, topic: str, hear: Callable, latched: bool = False) -> None:
+        """Reliable, keep last 100."""
+        made = self._node.create_subscription(kind, topic, hear, _quality(COMMANDS_DEPTH, latched), **_overridable())
+        self._undo.append(lambda: self._node.destroy_subscription(made))
+
+    def service(self, kind: type, name: str, answer: Callable) -> None:
+        """A service."""
+        made = self._node.create_service(kind, name, answer)
+        self._undo.append(lambda: self._node.destroy_service(made))
+
+    def timer(self, period: float, act: Callable[[], None]) -> None:
+        """A timer by the wall clock [s]."""
+        made = self._node.create_timer(period, act, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._undo.append(lambda: self._node.destroy_timer(made))
+
+    def close(self) -> None:
+        """Destroy all of them."""
+        while self._undo:
+            self._undo.pop()()
+
+
+def _quality(depth: int, latched: bool) -> QoSProfile:
+    """A profile of its own for each, because overriding changes it in place."""
+    durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+    return QoSProfile(reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=depth, durability=durability)
+
+
+def _overridable() -> dict[str, QoSOverridingOptions]:
+    policies = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
+    return {"qos_overriding_options": QoSOverridingOptions(policies)}

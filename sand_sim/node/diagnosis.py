@@ -1,0 +1,63 @@
+"""The node's health once a second on ``/diagnostics``."""
+
+import os
+import time
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+from msg_adapters.diagnostic_msgs import health_to_diagnostics
+from sand_sim.border import Observation
+from sand_sim.simulation import Simulation
+
+
+class Diagnosis:
+    """Error indicators, speed, memory, and what was refused.
+
+    Args:
+        simulation: that runs.
+        name: of the node.
+    """
+
+    def __init__(self, simulation: Simulation, name: str):
+        self._simulation, self._name = simulation, name
+        self._before = (time.monotonic(), 0.0)
+
+    def tell(self, last: Observation, dropped: int) -> DiagnosticArray:
+        """The state of things.
+
+        Args:
+            last: what was shown last.
+            dropped: clouds that were not told for want of time.
+        """
+        simulation = self._simulation
+        rejected = dict(simulation.rejected)
+        further = {
+            "real-time factor": f"{self._real_time_factor(last.time):.4f}",
+            "wall time of a step [us]": f"{1e6 * simulation.step_time:.4g}",
+            "memory [MB]": f"{_resident_memory() / 1e6:.0f}",
+            "commands slowed to max_speed": str(simulation.courses.limited),
+            "clouds dropped": str(dropped),
+            "commands rejected": str(sum(rejected.values())),
+            "last rejection": simulation.last_rejection,
+        } | {f"commands rejected: {reason}": str(count) for reason, count in rejected.items()}
+        device = simulation.world.assembly.solver.device.label
+        message = health_to_diagnostics(last.health, last.time, f"{self._name}: world", device, further)
+        if simulation.fault is not None:
+            message.status[0].level = DiagnosticStatus.ERROR
+            message.status[0].message = f"stepping has stopped: {simulation.fault}"
+        return message
+
+    def _real_time_factor(self, simulated: float) -> float:
+        """Since the last time it was asked; 0 after a reset."""
+        (wall, before), now = self._before, time.monotonic()
+        self._before = (now, simulated)
+        return max(simulated - before, 0.0) / max(now - wall, 1e-9)
+
+
+def _resident_memory() -> int:
+    """Bytes of this process that are in memory; 0 where that cannot be read."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        return 0

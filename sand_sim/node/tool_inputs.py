@@ -1,0 +1,137 @@
+"""What drives the tools: poses, velocities or TF, each from its topic to the simulation."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped, TwistStamped
+
+from msg_adapters import tf2_msgs
+from msg_adapters.geometry_msgs import pose_to_command, twist_to_command
+from sand_sim import rotation
+from sand_sim.border import CommandError, Frame, ToolPose
+from sand_sim.frames import FrameTree
+from sand_sim.node.connections import Connections
+from sand_sim.node.parameters import Parameters, frame_declarations
+from sand_sim.simulation import Simulation
+
+_NO_MOVE, _NO_TURN = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
+
+
+class ToolInputs:
+    """Listens to what shall move the tools.
+
+    Args:
+        connections: where subscriptions are made.
+        parameters: of the node, those of the tools declared.
+        simulation: that gets the commands.
+        active: tells whether commands are taken now.
+
+    Raises:
+        ValueError: if a tool is to follow TF and its messages are not installed, or a fixed frame cannot be.
+    """
+
+    def __init__(self, connections: Connections, parameters: Parameters, simulation: Simulation, active: Callable[[], bool]):
+        self._parameters, self._simulation, self._active = parameters, simulation, active
+        self._frames = _fixed_frames(parameters)
+        self._followers: dict[str, str] = {}
+        for tool in simulation.world.scene.tools:
+            self._connect(connections, tool.name)
+        if tf2_msgs.TFMessage is not None:
+            connections.subscription(tf2_msgs.TFMessage, "/tf", lambda message: self._hear_frames(message, False))
+            connections.subscription(tf2_msgs.TFMessage, "/tf_static", lambda message: self._hear_frames(message, True), True)
+
+    def _connect(self, connections: Connections, tool: str) -> None:
+        source = self._parameters[f"tools.{tool}.source"]
+        if source == "tf":
+            if tf2_msgs.TFMessage is None:
+                raise ValueError(f"parameter tools.{tool}.source: 'tf' needs the package tf2_msgs, which is not installed")
+            self._followers[tool] = self._parameters[f"tools.{tool}.frame"]
+        elif source == "twist":
+            self._listen(connections, TwistStamped, tool, "twist", self._velocity)
+        else:
+            self._listen(connections, PoseStamped, tool, "pose", self._pose)
+
+    def _listen(self, connections: Connections, kind: type, tool: str, topic: str, read: Callable) -> None:
+        def hear(message) -> None:
+            self._submit(lambda: read(message, tool), tool)
+
+        connections.subscription(kind, f"~/tools/{tool}/{topic}", hear)
+
+    def _submit(self, read: Callable, tool: str) -> None:
+        try:
+            if not self._active():
+                raise CommandError("inactive", f"tool '{tool}': the node is inactive; activate it (ros2 lifecycle set)")
+            command = read()
+            if self._parameters["stamps"] == "ignored":
+                command = replace(command, time=None)
+            self._simulation.submit(command)
+        except CommandError as error:
+            self._simulation.reject(error)
+
+    def _pose(self, message: PoseStamped, tool: str) -> ToolPose:
+        command = pose_to_command(message, tool)
+        try:
+            position, orientation = self._frames.in_root(message.header.frame_id, command.position, command.orientation)
+        except CommandError as error:
+            raise CommandError(error.reason, f"tool '{tool}': header.frame_id: {error}") from None
+        return replace(command, position=position, orientation=orientation)
+
+    def _velocity(self, message: TwistStamped, tool: str):
+        frame = message.header.frame_id
+        own = frame in (tool, self._parameters[f"tools.{tool}.frame"])
+        command = twist_to_command(message, tool, own)
+        if own:
+            return command
+        try:
+            _, turn = self._frames.in_root(frame, _NO_MOVE, _NO_TURN)
+        except CommandError as error:
+            raise CommandError(error.reason, f"tool '{tool}': header.frame_id: {error}") from None
+        return replace(command, linear=rotation.rotate(turn, command.linear), angular=rotation.rotate(turn, command.angular))
+
+    def _hear_frames(self, message, fixed: bool) -> None:
+        told = {}
+        for frame in tf2_msgs.message_to_frames(message, fixed):
+            if frame.name in self._parameters["frame_names"]:
+                continue  # what the parameters fix stays
+            try:
+                self._frames.put(frame)
+                told[frame.name] = frame.time
+            except CommandError as error:
+                self._simulation.reject(error)
+        for tool, name in self._followers.items():
+            self._follow(tool, name, told)
+
+    def _follow(self, tool: str, name: str, told: dict[str, float | None]) -> None:
+        """Command the pose of a frame if news concern it."""
+
+        def read() -> ToolPose:
+            return ToolPose(tool, *self._frames.in_root(name, _NO_MOVE, _NO_TURN), time=latest or None)
+
+        try:
+            chain = [frame.name for frame in self._frames.chain(name)]
+        except CommandError:
+            return  # not told yet
+        news = [told[frame] or 0.0 for frame in chain if frame in told]
+        if news:
+            latest = max(news)
+            self._submit(read, tool)
+
+
+def _fixed_frames(parameters: Parameters) -> FrameTree:
+    tree = FrameTree(parameters["frame_id"])
+    names = [name for name in parameters["frame_names"] if name]
+    for name in names:
+        parameters.declare(frame_declarations(name))
+        pose = np.array(parameters[f"frames.{name}.pose"])
+        parent = parameters[f"frames.{name}.parent"] or tree.root
+        try:
+            tree.put(Frame(name, parent, pose[:3], rotation.from_rpy(*pose[3:])))
+        except CommandError as error:
+            raise ValueError(f"parameter frames.{name}: {error}") from None
+    for name in names:
+        try:
+            list(tree.chain(name))
+        except CommandError as error:
+            raise ValueError(f"parameter frames.{name}.parent: {error}") from None
+    return tree

@@ -1,0 +1,80 @@
+"""Nodes and clients for the tests of this folder."""
+
+import subprocess
+import sys
+import threading
+
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="needs ROS 2")
+
+from node_client import Client
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from scenes import write_small_scene
+
+from sand_sim.node.node import SandSimNode
+
+
+@pytest.fixture
+def ros():
+    rclpy.init()
+    yield
+    rclpy.try_shutdown()
+
+
+@pytest.fixture
+def client(ros):
+    client = Client()
+    yield client
+    client.close()
+
+
+@pytest.fixture
+def start_node(ros, tmp_path):
+    """``start_node(pacing=..., ...)`` runs a node on the small scene in a thread of this process."""
+    running = []
+
+    def start(scene_fields=None, **parameters):
+        scene = write_small_scene(tmp_path, **(scene_fields or {}))
+        overrides = [Parameter(name, value=value) for name, value in ({"scene": str(scene)} | parameters).items()]
+        node = SandSimNode(parameter_overrides=overrides)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        if node.parameters["autostart"]:
+            node.start()
+        ending = threading.Event()
+
+        def spin():
+            while not ending.is_set():
+                executor.spin_once(timeout_sec=0.05)
+
+        thread = threading.Thread(target=spin)
+        thread.start()
+        running.append((node, ending, thread))
+        return node
+
+    yield start
+    for node, ending, thread in running:
+        ending.set()
+        thread.join()
+        node.destroy_node()
+
+
+@pytest.fixture
+def start_process(tmp_path):
+    """``start_process(pacing=..., ...)`` runs the node in another process."""
+    running = []
+
+    def start(**parameters):
+        assignments = [word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")]
+        command = [sys.executable, "-m", "sand_sim.node", "--ros-args", *assignments]
+        process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        running.append(process)
+        return process
+
+    yield start
+    for process in running:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()

@@ -1,0 +1,100 @@
+"""Lifecycle: configure, activate, deactivate, clean up, and whatever a client asks in the wrong moment."""
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+pytestmark = pytest.mark.xdist_group("processes")
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from node_client import START
+from rclpy.parameter import Parameter
+from scenes import write_small_scene
+from std_srvs.srv import Trigger
+
+
+def change(client, label):
+    request = ChangeState.Request(transition=Transition(id=getattr(Transition, f"TRANSITION_{label.upper()}"), label=""))
+    return client.call(ChangeState, "change_state", request).success
+
+
+def state(client):
+    return client.call(GetState, "get_state").current_state.label
+
+
+def test_a_life(client, start_node, tmp_path):
+    node = start_node(autostart=False, pacing="lockstep")
+    assert state(client) == "unconfigured"
+    assert client.node.count_publishers("/sand_sim/points") == 0
+    assert change(client, "configure")
+    assert state(client) == "inactive"
+    client.connect()
+    client.send(START, at=0.1)
+    client.wait_for(lambda: node.simulation.rejected == {"inactive": 1})
+    answer = client.call(Trigger, "step")
+    assert not answer.success
+    assert "inactive" in answer.message
+    assert node.simulation.world.time == 0.0
+
+    assert change(client, "activate")
+    client.send(START, at=0.1)
+    client.wait_for(lambda: client.time > 0.0999)
+    client.send(START, at=5.0)
+    assert change(client, "deactivate")
+    held = node.simulation.request(lambda: node.simulation.world.time).result(30.0)
+    assert held < 5.0
+    assert change(client, "activate")
+    client.wait_for(lambda: client.time > held + 0.01)
+
+    assert change(client, "deactivate")
+    assert change(client, "cleanup")
+    assert state(client) == "unconfigured"
+    client.wait_for(lambda: client.node.count_publishers("/sand_sim/points") == 0)
+    (tmp_path / "second").mkdir()
+    second = write_small_scene(tmp_path / "second", name="second")
+    assert node.set_parameters([Parameter("scene", value=str(second))])[0].successful
+    assert change(client, "configure")
+    assert change(client, "activate")
+    assert node.simulation.world.scene.name == "second"
+    client.wait_for(client.poses.get_subscription_count)
+    client.send(START, at=0.02)
+    client.wait_for(lambda: node.simulation.world.time == pytest.approx(0.02, abs=1e-4))
+    assert change(client, "active_shutdown")
+    assert node.done
+
+
+def test_impossible_transitions_are_refused(client, start_node):
+    node = start_node(pacing="lockstep")
+    for label in ("configure", "activate", "cleanup", "unconfigured_shutdown"):
+        assert not change(client, label), label
+    bad = ChangeState.Request(transition=Transition(id=200, label="explode"))
+    assert not client.call(ChangeState, "change_state", bad).success
+    assert state(client) == "active"
+    assert client.call(Trigger, "step").success
+    assert node.configured
+
+
+def test_a_scene_that_cannot_be_leaves_the_node_unconfigured(client, start_node, tmp_path):
+    node = start_node(autostart=False, pacing="lockstep")
+    good = node.get_parameter("scene").value
+    assert node.set_parameters([Parameter("scene", value="no_such_scene")])[0].successful
+    assert not change(client, "configure")
+    assert state(client) == "unconfigured"
+    assert "no_such_scene" in str(node.failure)
+    assert client.node.count_publishers("/sand_sim/points") == 0
+    assert node.set_parameters([Parameter("scene", value=good)])[0].successful
+    assert change(client, "configure")
+    assert state(client) == "inactive"
+
+
+def test_pausing_and_activity_both_hold(client, start_node):
+    node = start_node(pacing="fast", paused=True)
+    client.connect()
+    assert client.call(Trigger, "resume").success
+    client.wait_for(lambda: node.simulation.world.time > 0.0)
+    assert client.call(Trigger, "pause").success
+    assert change(client, "deactivate")
+    assert not client.call(Trigger, "resume").success
+    assert change(client, "activate")
+    assert node.simulation.paused, "as it was before"

@@ -1,0 +1,87 @@
+"""Parameters: described, ranged, changeable where physics allows, refused with a reason elsewhere."""
+
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+pytestmark = pytest.mark.xdist_group("processes")
+
+from node_client import START
+from rclpy.parameter import Parameter
+from rclpy.qos import ReliabilityPolicy
+
+from sand_sim.node.parameters import DECLARATIONS
+
+
+def set_one(node, name, value):
+    return node.set_parameters([Parameter(name, value=value)])[0]
+
+
+def test_all_are_described_and_numbers_have_ranges(ros, start_node):
+    node = start_node(pacing="lockstep")
+    for declaration in DECLARATIONS:
+        descriptor = node.describe_parameter(declaration.name)
+        assert len(descriptor.description) > 10
+        ranges = len(descriptor.floating_point_range) + len(descriptor.integer_range)
+        assert ranges == (type(declaration.default) in (int, float))
+        assert bool(declaration.choices) == ("One of" in descriptor.additional_constraints)
+    assert node.describe_parameter("points_rate").floating_point_range[0].to_value == 1000.0
+    assert node.describe_parameter("tools.plate.source").description
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("points_rate", -1.0, "points_rate out of range"),
+        ("points_rate", float("nan"), "points_rate"),
+        ("pacing", "slow", "pacing: unknown 'slow'; known are realtime, fast, lockstep"),
+        ("points_fields", ["x", "colour"], "points_fields: unknown 'colour'; known are x, y, z"),
+        ("points_fields", ["x", "x"], "points_fields: must name something, and nothing twice"),
+        ("points_region", [0.0, 1.0], "points_region: must be 6 finite numbers"),
+        ("points_region", [0.0, 0.0, 0.0, 1.0, 1.0, -1.0], "points_region: each of the first three"),
+        ("scene", "hopper", "scene: fixed while the node is configured; clean up"),
+        ("tools.plate.source", "twist", "tools.plate.source: fixed while the node is configured"),
+        ("tools.plate.wrench_frame", "moon", "unknown 'moon'; known are tool, world"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_a_reason(ros, start_node, name, value, reason):
+    node = start_node(pacing="lockstep")
+    before = node.get_parameter(name).value
+    result = set_one(node, name, value)
+    assert not result.successful
+    assert reason in result.reason
+    assert node.parameters[name] == node.get_parameter(name).value == before
+
+
+def test_pacing_changes_while_it_runs(client, start_node):
+    node = start_node(pacing="lockstep")
+    client.connect()
+    assert set_one(node, "pacing", "fast").successful
+    client.wait_for(lambda: client.time > 0.1)
+    assert set_one(node, "pacing", "lockstep").successful
+    now = node.simulation.request(lambda: node.simulation.world.time).result(30.0)
+    client.send(START, at=now + 0.1)
+    client.wait_for(lambda: client.time > now + 0.0999)
+    assert node.simulation.world.time == pytest.approx(now + 0.1, abs=1e-4)
+
+
+def test_limits_on_stamps_change_while_it_runs(client, start_node):
+    node = start_node(pacing="lockstep")
+    client.connect()
+    client.send(START, at=100.0)
+    client.wait_for(lambda: node.simulation.rejected == {"future": 1})
+    assert set_one(node, "stamp_furthest", 0.05).successful
+    client.send(START, at=0.06)
+    client.send(START, at=0.04)
+    client.wait_for(lambda: client.time > 0.0399)
+    assert node.simulation.rejected == {"future": 2}
+
+
+def test_quality_of_service_is_overridden_topic_by_topic(ros, start_node):
+    override = {"qos_overrides./sand_sim/points.publisher.reliability": "best_effort"}
+    node = start_node(pacing="lockstep", **override)
+    (points,) = node.get_publishers_info_by_topic("/sand_sim/points")
+    assert points.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+    for topic in ("/sand_sim/heights", "/clock", "/sand_sim/tools/plate/wrench"):
+        (other,) = node.get_publishers_info_by_topic(topic)
+        assert other.qos_profile.reliability == ReliabilityPolicy.RELIABLE

@@ -1,0 +1,199 @@
+"""What goes in and out beside poses and plain wrenches: velocities, frames, TF, filtered wrenches, contacts, heights."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+pytestmark = pytest.mark.xdist_group("processes")
+
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from nav_msgs.msg import MapMetaData
+from node_client import NO_TURN, START
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import Image, PointCloud2
+from std_msgs.msg import Float64
+from visualization_msgs.msg import MarkerArray
+
+from msg_adapters import tf2_msgs
+from msg_adapters.builtin_interfaces import stamp_to_time
+from msg_adapters.geometry_msgs import command_to_twist, frame_to_transform, wrench_to_arrays
+from msg_adapters.sensor_msgs import cloud_to_points, image_to_heights
+from sand_sim import rotation
+from sand_sim.border import Frame, ToolVelocity
+from sand_sim.node.tool_inputs import ToolInputs
+
+TOOL = "/sand_sim/tools/plate"
+PRESSED = [0.015, 0.015, 0.0238]
+TURNED = rotation.from_rpy(0.0, 0.0, 0.5 * np.pi)
+
+
+def hear(client, kind, topic, depth=100):
+    heard = []
+    client.node.create_subscription(kind, topic, heard.append, depth)
+    return heard
+
+
+def press(client, orientation=NO_TURN):
+    """Put the plate on the bed and press."""
+    for at, position in ((0.3, START), (0.5, PRESSED), (0.6, PRESSED)):
+        client.send(position, at=at, orientation=orientation)
+        client.wait_for(lambda: client.time > at - 1e-5)  # noqa: B023
+
+
+def test_tools_tell_what_they_feel_and_carry(client, start_node):
+    node = start_node(pacing="lockstep", contacts_rate=50.0)
+    filtered, poses = hear(client, WrenchStamped, f"{TOOL}/wrench_filtered"), hear(client, PoseStamped, f"{TOOL}/pose_actual")
+    carried, swept = hear(client, Float64, f"{TOOL}/carried"), hear(client, Float64, f"{TOOL}/swept")
+    clouds, markers = hear(client, PointCloud2, f"{TOOL}/contacts"), hear(client, MarkerArray, f"{TOOL}/contact_markers")
+    client.connect()
+    client.wait_for(lambda: client.node.count_publishers(f"{TOOL}/contact_markers"))
+    press(client)
+    report = node.simulation.request(node.simulation.world.observe).result(30.0).tools[0]
+    for heard in (filtered, poses, carried, swept, clouds, markers):
+        client.wait_for(lambda: heard)  # noqa: B023
+    client.wait_for(lambda: stamp_to_time(poses[-1].header.stamp) > 0.59)
+    at = poses[-1].pose.position
+    assert [at.x, at.y, at.z] == pytest.approx(report.position)
+    assert poses[-1].header.frame_id == "world"
+    assert carried[-1].data == pytest.approx(report.carried, abs=1e-9)
+    assert swept[-1].data == pytest.approx(report.swept, rel=1e-6, abs=1e-12)
+
+    raw, smooth = (
+        np.array([wrench_to_arrays(message)[0][2] for message in heard[-20:]]) for heard in (client.wrenches, filtered)
+    )
+    assert smooth[-1] == pytest.approx(raw[-1], rel=0.1)
+    assert np.abs(np.diff(smooth)).max() < 0.8 * np.abs(np.diff(raw)).max()
+
+    client.wait_for(lambda: stamp_to_time(clouds[-1].header.stamp) > 0.59)
+    contacts = cloud_to_points(clouds[-1])
+    pushed = contacts["fz"].sum()
+    assert pushed == pytest.approx(raw[-1], rel=0.2), "of the last step, where the wrench is the mean over the frame"
+    assert np.all(contacts["overlap"] > 0.0)
+    assert set(contacts["id"]) <= set(range(32))
+    client.wait_for(lambda: stamp_to_time(markers[-1].markers[0].header.stamp) > 0.59)
+    assert len(markers[-1].markers[0].points) == 2 * len(contacts)
+
+
+def test_a_wrench_in_the_axes_of_the_world(client, start_node):
+    start_node(pacing="lockstep", **{"tools.plate.wrench_frame": "world"})
+    upside_down = rotation.from_rpy(np.pi, 0.0, 0.0)
+    client.connect()
+    press(client, upside_down)
+    client.wait_for(lambda: stamp_to_time(client.wrenches[-1].header.stamp) > 0.59)
+    assert client.wrenches[-1].header.frame_id == "world"
+    assert wrench_to_arrays(client.wrenches[-1])[0][2] > 0.5, "the bed pushes up, whichever way the tool is turned"
+
+
+def test_heights_and_their_grid(client, start_node):
+    start_node(pacing="lockstep", heights_cell=0.0101, heights_rate=50.0)
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    images, grids = hear(client, Image, "/sand_sim/heights"), hear(client, MapMetaData, "/sand_sim/heights_grid", latched)
+    client.connect()
+    client.wait_for(lambda: client.node.count_publishers("/sand_sim/heights") and grids)
+    client.send(START, at=0.1)
+    client.wait_for(lambda: images)
+    heights, grid = image_to_heights(images[-1]), grids[-1]
+    assert (grid.height, grid.width) == heights.shape
+    assert grid.resolution == pytest.approx(0.0101)
+    assert np.nanmax(heights) == pytest.approx(0.02, abs=0.001), "two layers of grains 10 mm thick"
+    assert np.isfinite(heights).sum() >= 9
+
+
+def test_poses_in_fixed_frames(client, start_node):
+    parameters = {
+        "frame_names": ["base", "mast"],
+        "frames.base.pose": [1.0, 0.0, 0.0, 0.0, 0.0, 0.5 * np.pi],
+        "frames.mast.pose": [0.0, 0.0, 0.5, 0.0, 0.0, 0.0],
+        "frames.mast.parent": "base",
+    }
+    node = start_node(pacing="lockstep", **parameters)
+    client.connect()
+    # The mast stands at (1, 0, 0.5) and is turned left by a right angle.
+    x, y, z = START
+    back = rotation.inverse(TURNED)
+    client.send([y, 1.0 - x, z - 0.5], at=0.1, frame="mast", orientation=back)
+    client.send(START, at=0.2, frame="moon")
+    client.wait_for(lambda: client.time > 0.0999)
+    report = node.simulation.request(node.simulation.world.observe).result(30.0).tools[0]
+    assert report.position == pytest.approx(START, abs=1e-9)
+    assert report.orientation == pytest.approx(NO_TURN, abs=1e-9)
+    client.wait_for(lambda: node.simulation.rejected == {"unknown_frame": 1})
+    assert "header.frame_id: frame 'moon' does not hang on 'world'; known are base, mast, world" in node.simulation.last_rejection
+
+
+@pytest.mark.parametrize(
+    ("parameters", "named"),
+    [
+        ({"frame_names": ["base"], "frames.base.parent": "moon"}, "frames.base.parent: frame 'base' does not hang on 'world'"),
+        ({"frame_names": ["world"]}, "frames.world: frame 'world' in 'world': needs two different names"),
+        ({"frame_names": ["base"], "frames.base.pose": [1.0]}, "frames.base.pose: must be 6 finite numbers"),
+        ({"tools.plate.source": "telepathy"}, "tools.plate.source: unknown 'telepathy'; known are pose, twist, tf"),
+    ],
+)
+def test_inputs_that_cannot_be_are_named(ros, start_node, parameters, named):
+    with pytest.raises(ValueError, match=named):
+        start_node(pacing="lockstep", **parameters)
+
+
+def test_velocities_drive_a_tool(client, start_node):
+    parameters = {
+        "tools.plate.source": "twist",
+        "frame_names": ["base"],
+        "frames.base.pose": [0.0, 0.0, 0.0, 0.0, 0.0, 0.5 * np.pi],
+    }
+    node = start_node(pacing="lockstep", **parameters)
+    twists = client.node.create_publisher(TwistStamped, f"{TOOL}/twist", 100)
+    client.wait_for(twists.get_subscription_count)
+    forward = np.array([0.1, 0.0, 0.0])
+
+    def drive(at, frame, linear, angular=(0.0, 0.0, 0.0)):
+        twists.publish(command_to_twist(ToolVelocity("plate", np.array(linear), np.array(angular), time=at), frame))
+        client.wait_for(lambda: client.time > at - 1e-5)
+        return node.simulation.request(node.simulation.world.observe).result(30.0).tools[0]
+
+    assert drive(0.1, "world", forward, (0.0, 0.0, 5.0 * np.pi)).position == pytest.approx(START + [0.01, 0.0, 0.0], abs=1e-5)
+    report = drive(0.2, "plate", forward)
+    assert report.position == pytest.approx(START + [0.01, 0.01, 0.0], abs=3e-5), "it has turned left"
+    assert drive(0.3, "base", forward).position == pytest.approx(START + [0.01, 0.02, 0.0], abs=5e-5)
+    twists.publish(command_to_twist(ToolVelocity("plate", forward, np.zeros(3), time=0.4), "moon"))
+    client.wait_for(lambda: node.simulation.rejected == {"unknown_frame": 1})
+
+
+def test_a_tool_follows_its_frame_in_tf(monkeypatch):
+    """The messages of TF are not among the wheels, so they come without the middleware."""
+    monkeypatch.setattr(tf2_msgs, "TFMessage", SimpleNamespace)
+    heard, submitted, rejected = {}, [], []
+
+    def subscribe(kind, topic, callback, latched=False):
+        heard[topic] = callback
+
+    parameters = {
+        "frame_id": "world",
+        "frame_names": [""],
+        "stamps": "simulated",
+        "tools.plate.source": "tf",
+        "tools.plate.frame": "tcp",
+    }
+    scene = SimpleNamespace(tools=[SimpleNamespace(name="plate")])
+    simulation = SimpleNamespace(world=SimpleNamespace(scene=scene), submit=submitted.append, reject=rejected.append)
+    ToolInputs(SimpleNamespace(subscription=subscribe), parameters, simulation, lambda: True)
+
+    def tell(topic, *frames):
+        heard[topic](SimpleNamespace(transforms=[frame_to_transform(frame) for frame in frames]))
+
+    tell("/tf", Frame("tcp", "arm", np.array([0.0, 0.0, 0.1]), NO_TURN, 0.5))
+    assert not submitted, "not connected to the world yet"
+    tell("/tf_static", Frame("base", "world", np.array([1.0, 0.0, 0.0]), NO_TURN))
+    tell("/tf", Frame("arm", "base", np.array([0.0, 0.0, 1.0]), TURNED, 0.6), Frame("wheel", "base", np.zeros(3), NO_TURN, 0.7))
+    assert len(submitted) == 1
+    assert submitted[0].position == pytest.approx([1.0, 0.0, 1.1])
+    assert submitted[0].orientation == pytest.approx(TURNED)
+    assert submitted[0].time == pytest.approx(0.6)
+    tell("/tf", Frame("wheel", "base", np.zeros(3), NO_TURN, 0.8))
+    assert len(submitted) == 1, "none of its business"
+    tell("/tf", Frame("arm", "base", np.array([0.0, np.nan, 1.0]), TURNED, 0.9))
+    assert [error.reason for error in rejected] == ["not_finite"]
+    assert len(submitted) == 1

@@ -1,0 +1,96 @@
+"""Height maps against a slow loop over cells in double precision, and closed forms."""
+
+import time
+
+import numpy as np
+import pytest
+from clouds import cloud_of
+from scenes import write_small_scene
+
+from sand_sim import World, load_scene
+from sand_sim.height_map import bed_grid, footprint_grid, make_height_map
+
+
+def slow_heights(cloud, low, cell, shape):
+    """Cell by cell, sphere by sphere."""
+    heights = np.full(shape, np.nan)
+    for row in range(shape[0]):
+        for column in range(shape[1]):
+            middle = np.asarray(low) + cell * (np.array([column, row]) + 0.5)
+            square = cloud.radius.astype(float) ** 2 - np.sum((cloud.position[:, :2] - middle) ** 2, axis=1)
+            tops = cloud.position[square >= 0.0, 2] + np.sqrt(square[square >= 0.0])
+            heights[row, column] = tops.max(initial=-np.inf) if len(tops) else np.nan
+    return heights
+
+
+@pytest.mark.parametrize("cell", [0.002, 0.011, 0.05])
+def test_equals_a_slow_loop(cell, monkeypatch):
+    monkeypatch.setattr("sand_sim.height_map._AT_ONCE", 1000)  # in many parts
+    random = np.random.default_rng(3)
+    cloud = cloud_of(random.uniform([-0.1, 0.0, -0.02], [0.1, 0.15, 0.05], (400, 3)), random.uniform(0.001, 0.012, 400))
+    low, shape = footprint_grid([-0.07, -0.02], [0.12, 0.12], cell)  # some grains lie beside it
+    found = make_height_map(cloud, low, cell, shape).heights
+    expected = slow_heights(cloud, low, cell, shape)
+    assert found.dtype == np.float32
+    assert np.array_equal(np.isnan(found), np.isnan(expected))
+    assert found == pytest.approx(expected, abs=1e-8, nan_ok=True)
+    assert np.isnan(expected).any() or cell == 0.05
+
+
+def test_one_sphere_is_a_cap():
+    """z + sqrt(R^2 - x^2 - y^2) over its disc, the floor elsewhere; rows run along y."""
+    cloud = cloud_of([0.03, 0.01, 0.5], 0.02)
+    found = make_height_map(cloud, [0.0, 0.0], 0.001, (40, 80), floor=-1.0).heights.astype(float)
+    y, x = (np.mgrid[:40, :80] + 0.5) * 0.001
+    square = float(np.float32(0.02)) ** 2 - (x - 0.03) ** 2 - (y - 0.01) ** 2
+    assert found == pytest.approx(np.where(square >= 0.0, 0.5 + np.sqrt(np.maximum(square, 0.0)), -1.0), abs=1e-7)
+
+
+def test_plane_of_spheres_on_their_own_grid_is_flat():
+    """Spheres under the middles of the cells, and more below: all heights are z + R."""
+    y, x = np.mgrid[:20, :30]
+    upper = np.column_stack([x.ravel() + 0.5, y.ravel() + 0.5, np.full(x.size, 3.0)]) * 0.01
+    cloud = cloud_of(np.concatenate([upper - [0.0, 0.0, 0.01], upper]), 0.005)
+    assert make_height_map(cloud, [0.0, 0.0], 0.01, (20, 30)).heights == pytest.approx(0.035, abs=1e-8)
+    above = cloud.position[:, 2] > 0.025
+    assert make_height_map(cloud, [0.0, 0.0], 0.01, (20, 30), left_out=above).heights == pytest.approx(0.025, abs=1e-8)
+
+
+def test_hundred_thousand_grains_are_fast():
+    random = np.random.default_rng(0)
+    cloud = cloud_of(random.uniform(0.0, [1.0, 1.0, 0.1], (100_000, 3)), random.uniform(0.004, 0.006, 100_000))
+    best = np.inf
+    for _ in range(5):
+        begin = time.perf_counter()
+        make_height_map(cloud, [0.0, 0.0], 0.01, (100, 100))
+        best = min(best, time.perf_counter() - begin)
+    print(f"{1e3 * best:.1f} ms")
+    assert best < 0.05
+
+
+def test_grid_covers_the_bed(tmp_path):
+    world = World(load_scene(write_small_scene(tmp_path)))
+    cloud = world.observe().spheres
+    low, cell, shape = bed_grid(world.scene, cloud)
+    assert cell == pytest.approx(0.01)
+    reach = cloud.radius[:, None]
+    assert np.all(low <= (cloud.position[:, :2] - reach).min(axis=0) + 1e-9)
+    assert np.all(low + cell * np.array(shape)[::-1] >= (cloud.position[:, :2] + reach).max(axis=0) - 1e-9)
+    heights = make_height_map(cloud, low, 0.5 * cell, (2 * shape[0], 2 * shape[1])).heights
+    assert np.nanmax(heights) <= (cloud.position[:, 2] + cloud.radius).max() + 1e-7
+    assert np.isfinite(heights).mean() > 0.5
+
+
+def test_grains_in_a_tool_can_be_left_out(tmp_path):
+    world = World(load_scene(write_small_scene(tmp_path)))
+    model = world.tools[0]
+    points = np.array([[0.0, 0.0, 0.0], [0.029, 0.0, 0.0019], [0.031, 0.0, 0.0], [0.0, 0.0, 0.0021]])
+    turn = np.array([0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
+    world_points = np.column_stack([-points[:, 1], points[:, 0], points[:, 2]]) + [1.0, 2.0, 3.0]
+    assert model.holds(world_points, np.array([1.0, 2.0, 3.0]), turn).tolist() == [True, True, False, False]
+
+
+@pytest.mark.parametrize(("cell", "shape"), [(0.0, (2, 2)), (np.nan, (2, 2)), (0.1, (0, 2))])
+def test_senseless_grids_are_refused(cell, shape):
+    with pytest.raises(ValueError, match="must be positive"):
+        make_height_map(cloud_of([0.0, 0.0, 0.0], 0.1), [0.0, 0.0], cell, shape)
