@@ -39,7 +39,7 @@ setup(
             "ros-jazzy-rmw-fastrtps-cpp==8.4.3",
         ],
         "figures": ["matplotlib==3.11.2"],
-        "test": ["pytest==9.2.0", "pytest-xdist==3.8.0", "ruff==0.17.6"],
+        "test": ["pytest==9.2.0", "pytest-xdist==3.8.0", "hypothesis==6.170.15", "ruff==0.17.6"],
     },
     entry_points={
         "console_scripts": [

@@ -7,16 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+_LONGEST_MESSAGE = 400  # letters: whatever a stranger sends ends up in logs and diagnostics
+
 
 class CommandError(ValueError):
     """A command that was rejected; the world goes on as before.
 
-    Attributes:
+    Args:
         reason: a short word for counting rejections.
+        message: what is wrong; cut where it is long, and with a question mark for what cannot be printed.
     """
 
     def __init__(self, reason: str, message: str):
-        super().__init__(message)
+        if len(message) > _LONGEST_MESSAGE:
+            message = message[: _LONGEST_MESSAGE // 2] + " ... " + message[-_LONGEST_MESSAGE // 2 :]
+        super().__init__("".join(letter if letter.isprintable() else "?" for letter in message))
         self.reason = reason
 
 

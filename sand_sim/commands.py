@@ -9,6 +9,7 @@ from sand_sim import rotation
 from sand_sim.border import CommandError, ToolPose, ToolVelocity
 
 Command = ToolPose | ToolVelocity
+_LEAST_LENGTH = 1e-6  # of a quaternion
 
 
 def check_command(command: Command, tools: Collection[str]) -> Command:
@@ -30,10 +31,11 @@ def check_command(command: Command, tools: Collection[str]) -> Command:
     if not np.all(np.isfinite(np.concatenate([*values.values(), [command.time or 0.0]]))):
         raise CommandError("not_finite", f"{tool}: {names[0]}, {names[1]} and time must be finite")
     if not moving:
-        length = float(np.linalg.norm(values["orientation"]))
-        if length < 1e-6:
+        orientation = values["orientation"]
+        largest = float(np.abs(orientation).max())  # divided out first, because squares of large numbers overflow
+        if largest < _LEAST_LENGTH or largest * (length := float(np.linalg.norm(orientation / largest))) < _LEAST_LENGTH:
             raise CommandError("zero_quaternion", f"{tool}: orientation is the zero quaternion; (0, 0, 0, 1) is no rotation")
-        values["orientation"] = values["orientation"] / length
+        values["orientation"] = orientation / largest / length
     return replace(command, **values)
 
 

@@ -15,6 +15,8 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
+import numpy as np
+
 from sand_sim.border import CommandError, Observation
 from sand_sim.commands import Command
 from sand_sim.courses import USUAL, Courses, StampRules
@@ -68,7 +70,7 @@ class Simulation:
         self.last_rejection = ""
         self.step_time = 0.0
         self._on_frame, self._on_fault, self._on_reject = on_frame, on_fault, on_reject
-        self._wake = threading.Condition()
+        self._wake, self._counting = threading.Condition(), threading.Lock()
         self._inbox: deque[Command] = deque()
         self._requests: deque[tuple[Callable[[], Any], Future]] = deque()
         self._paused = self._stopping = False
@@ -112,8 +114,9 @@ class Simulation:
 
     def reject(self, error: CommandError) -> None:
         """Count a command that was refused before it could be submitted."""
-        self.rejected[error.reason] += 1
-        self.last_rejection = str(error)
+        with self._counting:
+            self.rejected[error.reason] += 1
+            self.last_rejection = str(error)
         self._on_reject(error)
 
     def pause(self, paused: bool) -> None:
@@ -182,7 +185,8 @@ class Simulation:
             self._inbox.clear()
             self._requests.clear()
         if self.fault is None:
-            self.courses.take(commands, self.reject)
+            with np.errstate(over="ignore", invalid="ignore"):  # what comes of huge numbers is refused
+                self.courses.take(commands, self.reject)
         else:
             for command in commands:
                 self.reject(CommandError("stopped", f"tool '{command.tool}': stepping has stopped, reset to go on"))

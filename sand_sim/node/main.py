@@ -29,7 +29,7 @@ def main(arguments: list[str] | None = None) -> int:
         if node.parameters["autostart"]:
             node.start()
         while not (interruption.asked or node.done):
-            executor.spin_once(timeout_sec=0.1)
+            _spin(executor, node)
         return 1 if node.configured and node.simulation.fault else 0
     except (InterruptedByUserError, ExternalShutdownException):
         return 0
@@ -41,3 +41,15 @@ def main(arguments: list[str] | None = None) -> int:
             executor.shutdown()  # it holds on to what it waits for
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _spin(executor, node) -> None:
+    """Wait for something to do and do it; an error while one message or request is answered must not end the others."""
+    from rclpy.executors import ExternalShutdownException
+
+    try:
+        executor.spin_once(timeout_sec=0.1)
+    except ExternalShutdownException:
+        raise
+    except Exception as error:
+        node.get_logger().error(f"{type(error).__name__}: {error}", throttle_duration_sec=1.0)

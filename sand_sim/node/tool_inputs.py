@@ -62,7 +62,8 @@ class ToolInputs:
         try:
             if not self._active():
                 raise CommandError("inactive", f"tool '{tool}': the node is inactive; activate it (ros2 lifecycle set)")
-            command = read()
+            with np.errstate(over="ignore", invalid="ignore"):  # what comes of huge numbers is refused
+                command = read()
             if self._parameters["stamps"] == "ignored":
                 command = replace(command, time=None)
             self._simulation.submit(command)
