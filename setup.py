@@ -23,6 +23,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (SHARE, ["package.xml"]),
         (f"{SHARE}/config", glob("config/*.yaml") + glob("config/*.csv")),
+        (f"{SHARE}/config/ros", glob("config/ros/*")),
         (f"{SHARE}/config/meshes", glob("config/meshes/*.stl")),
         (f"{SHARE}/launch", glob("launch/*.launch.py")),
     ],

@@ -18,8 +18,10 @@ def main(arguments: list[str] | None = None) -> int:
     from rclpy.signals import SignalHandlerOptions
 
     from sand_sim.node.node import SandSimNode
+    from sand_sim.node.transport import enlarge_shared_memory
     from sand_sim.scene.types import SceneError
 
+    enlarge_shared_memory()
     rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     executor, node = SingleThreadedExecutor(), None
     try:

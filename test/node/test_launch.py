@@ -1,0 +1,73 @@
+"""What the launch file, the RViz configuration and the parameter file name exists; launch itself is not among the wheels."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+import yaml
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+from sand_sim.config_folder import config_folder
+from sand_sim.node.parameters import DECLARATIONS
+
+ROOT = Path(__file__).parents[2]
+NAMES = {declaration.name for declaration in DECLARATIONS}
+
+
+class Noted:
+    """Stands for any class of launch: keeps what it is made of."""
+
+    def __init__(self, *arguments, **named):
+        self.arguments, self.named = arguments, named
+
+
+@pytest.fixture
+def launch_file(monkeypatch):
+    for module, names in {
+        "launch": ["LaunchDescription"],
+        "launch.actions": ["DeclareLaunchArgument"],
+        "launch.conditions": ["IfCondition"],
+        "launch.substitutions": ["LaunchConfiguration"],
+        "launch_ros": [],
+        "launch_ros.actions": ["LifecycleNode", "Node"],
+        "launch_ros.parameter_descriptions": ["ParameterFile", "ParameterValue"],
+    }.items():
+        made = ModuleType(module)
+        for name in names:
+            setattr(made, name, type(name, (Noted,), {}))
+        monkeypatch.setitem(sys.modules, module, made)
+    path = ROOT / "launch" / "sand_sim.launch.py"
+    spec = importlib.util.spec_from_file_location("sand_sim_launch", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_launch_arguments_are_parameters_of_the_node(launch_file):
+    assert set(launch_file.PARAMETERS) <= NAMES
+    (entries,) = launch_file.generate_launch_description().arguments
+    declared = {entry.arguments[0]: entry.named for entry in entries if type(entry).__name__ == "DeclareLaunchArgument"}
+    assert all(entry["description"] for entry in declared.values())
+    (node,) = (entry for entry in entries if type(entry).__name__ == "LifecycleNode")
+    assert set(node.named["parameters"][1]) == set(launch_file.PARAMETERS)
+    assert Path(declared["params_file"]["default_value"]).is_file()
+    defaults = {declaration.name: declaration.default for declaration in DECLARATIONS}
+    for name, (default, _, kind) in launch_file.PARAMETERS.items():
+        assert yaml.safe_load(default or "''") == defaults[name]
+        assert isinstance(defaults[name], kind)
+
+
+def test_parameter_file_names_parameters_with_their_defaults():
+    given = yaml.safe_load((config_folder() / "ros" / "node.yaml").read_text())["/**"]["ros__parameters"]
+    defaults = {declaration.name: declaration.default for declaration in DECLARATIONS}
+    assert given == {name: defaults[name] for name in given}
+
+
+def test_rviz_shows_topics_of_the_node():
+    displays = yaml.safe_load((config_folder() / "ros" / "sand_sim.rviz").read_text())["Visualization Manager"]["Displays"]
+    topics = {display["Topic"]["Value"] for display in displays if "Topic" in display}
+    tool = "/sand_sim/tools/bucket"
+    assert topics <= {"/sand_sim/points", "/sand_sim/heights", f"{tool}/contact_markers", f"{tool}/wrench_filtered"}
