@@ -4,6 +4,8 @@ import sys
 
 from sand_sim.interruption import InterruptedByUserError, Interruption
 
+_SWITCH_INTERVAL = 5e-5  # [s] that Python's threads wait for each other; with the usual 5 ms stepping waits for messages
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the node until it is interrupted or its duration is over.
@@ -12,6 +14,7 @@ def main(arguments: list[str] | None = None) -> int:
         Exit code: 0, or 1 if the node could not start, or was to end when the run blows up and it did.
     """
     interruption = Interruption()  # before the long imports
+    sys.setswitchinterval(_SWITCH_INTERVAL)
     import rclpy
     from rclpy.exceptions import ParameterException
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
