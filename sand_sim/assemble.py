@@ -96,7 +96,7 @@ class Assembly:
     def safe_step(self, speed: float, depth: float) -> float:
         """The step [s] that would be safe at a top speed [m/s] and an overlap over radius [1]."""
         free = replace(self.light, solver=replace(self.light.solver, time_step=None))
-        spacings = [tool.body.spacing for tool in self.tools]
+        spacings = [model.body.spacing for model in (*_rough(self.tools), *self.grounds)]
         return choose_time_step(free, self.smallest, max(speed, self.time_step.speed), spacings, max(depth, DEEP)).safe
 
 
@@ -137,6 +137,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         integrator=scene.solver.integrator,
         materials=len(_loose_materials(scene)) > 1,
         bodies=len(table.bodies) > 0,
+        smooth_tools=any(tool.smooth for tool in tools),
         surfaces=kinds_of(walls),
     )
     pairs = _pair_table(scene, order, precision)
@@ -148,7 +149,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         lattice,
         table,
         make_surfaces(walls, order, lattice, float(table.radius.min())),
-        [ToolBody(tool.body.points, tool.body.radius, order.index(tool.tool.material)) for tool in tools]
+        [_tool_body(tool, order) for tool in tools]
         + [ToolBody(ground.body.points, ground.body.radius, order.index(ground.material)) for ground in grounds],
         pairs,
         device,
@@ -183,6 +184,15 @@ def _open_device(scene: Scene, spheres: int):
         raise SceneError(f"solver.device: {error}") from None
 
 
+def _rough(tools: list[ToolModel]) -> list[ToolModel]:
+    return [tool for tool in tools if not tool.smooth]
+
+
+def _tool_body(tool: ToolModel, order: list[str]) -> ToolBody:
+    surface = tool.body.triangles if tool.smooth else None
+    return ToolBody(tool.body.points, tool.body.radius, order.index(tool.tool.material), surface)
+
+
 def _loose_materials(scene: Scene) -> set[str]:
     """Names of the materials of everything that moves freely."""
     return {one.material for one in (*scene.fills, *scene.bodies)}
@@ -205,7 +215,7 @@ def _time_step(
     """The step, shortened so that a whole number of steps makes a frame unless the scene gives it, and that number."""
     given = float(np.linalg.norm(table.velocity, axis=1).max())
     speed = fastest_speed(scene, _fall_height(scene, table, walls, grounds), given)
-    chosen = choose_time_step(scene, smallest, speed, [model.body.spacing for model in (*tools, *grounds)])
+    chosen = choose_time_step(scene, smallest, speed, [model.body.spacing for model in (*_rough(tools), *grounds)])
     frame = 1.0 / scene.frame_rate
     if scene.solver.time_step is not None:
         return chosen, max(1, round(frame / chosen.value))

@@ -19,7 +19,7 @@ def find_overlap(assembly: Assembly) -> tuple[str, ...]:
         doubts.append(f"grains overlap by {share} at the start; the {sums.elastic:.3g} J stored there drive them apart")
     position = observe_grains(assembly).position
     for tool in assembly.tools:
-        inside = int((tool.distance(position) < -tool.body.radius).sum())
+        inside = int((tool.distance(position) < -tool.margin).sum())
         if inside:
             doubts.append(f"grains start inside tool '{tool.tool.name}' ({inside} of them), where nothing touches them")
     return tuple(doubts)
@@ -29,7 +29,7 @@ def find_fine_tools(assembly: Assembly) -> tuple[str, ...]:
     """Doubts that tools have particles so fine that grains touch many at once, each with springs and dashpots of its own."""
     doubts = []
     radius, material = max((radius, name) for name, radius in assembly.smallest.items())
-    for model in assembly.tools:
+    for model in (tool for tool in assembly.tools if not tool.smooth):
         overlap = min(_impact_overlap(assembly, material, radius, model.tool.material), DEEP * radius)
         touched = particles_touched(radius, model.body.radius, model.body.spacing, overlap)
         if touched > _CROWD:

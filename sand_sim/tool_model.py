@@ -10,30 +10,44 @@ import trimesh
 from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_file
 from sand_sim import rotation
 from sand_sim.scene.shapes import shape_named
-from sand_sim.scene.types import Scene, SceneError, Tool
+from sand_sim.scene.types import SMOOTH, Scene, SceneError, Tool
 
 Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
 class ToolModel:
-    """A tool with its mesh and its particles, both in the tool frame [m]."""
+    """A tool with its mesh and its particles, both in the tool frame [m].
+
+    Grains touch its particles if it is rough, and the mesh as repaired, ``body.triangles``, if it is smooth.
+    """
 
     tool: Tool
     mesh: trimesh.Trimesh
     body: ParticleBody
 
     @property
+    def smooth(self) -> bool:
+        """Whether grains touch the mesh itself."""
+        return self.tool.contact == SMOOTH
+
+    @property
+    def margin(self) -> float:
+        """How far its surface lies outside the mesh [m]."""
+        return 0.0 if self.smooth else self.body.radius
+
+    @property
     def extent(self) -> float:
-        """Farthest particle surface from the tool frame's origin [m]."""
-        return float(np.linalg.norm(self.body.points, axis=1).max() + self.body.radius)
+        """Farthest point of its surface from the tool frame's origin [m]."""
+        points = self.body.triangles.reshape(-1, 3) if self.smooth else self.body.points
+        return float(np.linalg.norm(points, axis=1).max() + self.margin)
 
     @property
     def box(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest corner of its hull in the world at the initial pose, shape (3,) each [m]."""
         pose = self.tool.pose
         corners = np.asarray(pose.position) + rotation.rotate(np.asarray(pose.orientation), np.asarray(self.mesh.vertices))
-        return corners.min(axis=0) - self.body.radius, corners.max(axis=0) + self.body.radius
+        return corners.min(axis=0) - self.margin, corners.max(axis=0) + self.margin
 
     def holds(self, points: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Whether world points, shape (n, 3), are inside the mesh's bounding box at a pose of the tool, shape (n,)."""
@@ -44,14 +58,14 @@ class ToolModel:
         return inside
 
     def distance(self, position: np.ndarray) -> np.ndarray:
-        """Distance of world points, shape (n, 3), from the particles' hull at the initial pose, shape (n,) [m]."""
+        """Distance of world points, shape (n, 3), from its surface at the initial pose, shape (n,) [m]."""
         pose = self.tool.pose
         local = rotation.rotate(rotation.inverse(np.asarray(pose.orientation)), position - np.asarray(pose.position))
-        return SignedDistance(self.mesh).query(local)[0] - self.body.radius
+        return SignedDistance(self.mesh).query(local)[0] - self.margin
 
 
 def model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
-    """Sample a tool's mesh, so finely that no grain of the scene's fills passes between its particles.
+    """Sample a tool's mesh, so finely that no grain of the scene's fills passes between the particles it may touch.
 
     Args:
         tool: of the scene.
@@ -65,7 +79,7 @@ def model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
         path = locate_mesh(tool.mesh, scene.folder)
         mesh = read_mesh(path, tool.scale)
         show = partial(progress, f"sampling {tool.name}")
-        grain, spacing = _smallest_grain(scene), tool.particle_spacing
+        grain, spacing = None if tool.contact == SMOOTH else _smallest_grain(scene), tool.particle_spacing
         body = sample_file(path, tool.particle_radius, tool.scale, grain=grain, spacing=spacing, progress=show)
     except MeshError as error:
         raise SceneError(f"tools.{tool.name}.mesh: {error}") from None

@@ -122,6 +122,7 @@ class DemArrays:
         farthest = float(table.radius.max()) + setting.listing_gap
         self.tools = Tools(bodies, farthest, precision, device) if bodies else None
         self.tool_list = self._contact_list(few) if bodies else None
+        self.touch = self.old_touch = None
         self.grain_blocks = wp.zeros(energy.blocks_for(number), dtype=wp.vec3d, device=device)
         self.make_room()
 
@@ -165,7 +166,17 @@ class DemArrays:
             room = self.tool_list.pairs.capacity
             blocks = -(-room // tool_contacts.SUM_BLOCK)
             self.lever = wp.zeros(room, dtype=precision.vec3, device=self.device)
+            if self.tools.smooth:
+                self._make_room_to_touch(room)
             self.wrench_blocks = wp.zeros((blocks * self.tools.number, 2), dtype=wp.vec3d, device=self.device)
+
+    def _make_room_to_touch(self, room: int) -> None:
+        kept, vec4 = self.touch, self.recipe.precision.vec4
+        if kept is None or kept.shape[0] < room:
+            self.touch = wp.zeros(room, dtype=vec4, device=self.device)
+            if kept is not None:
+                wp.copy(self.touch, kept, count=kept.shape[0])
+            self.old_touch = wp.zeros(room, dtype=vec4, device=self.device) if self.recipe.history else None
 
     def _contact_list(self, room: int) -> ContactList:
         return ContactList(room, self.grains.capacity, self.recipe, self.on)

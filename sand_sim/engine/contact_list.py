@@ -77,6 +77,38 @@ def listed_at(starts: wp.array(dtype=int), partner: wp.array(dtype=int), grain: 
     return found
 
 
+@cache
+def build_note(recipe: Recipe, filling: bool) -> wp.Function:
+    """Warp function that counts or, ``filling``, lists a contact of a grain, with what the last list remembers of it."""
+    history, memory_vector = recipe.history, memory_type(recipe.contact, recipe.precision)
+
+    @wp.func
+    def note(
+        found: int,
+        grain: int,
+        number: int,
+        owner: wp.array(dtype=int),
+        partner: wp.array(dtype=int),
+        memory: wp.array(dtype=memory_vector),
+        came_from: wp.array(dtype=int),
+        old_starts: wp.array(dtype=int),
+        old_partner: wp.array(dtype=int),
+        old_memory: wp.array(dtype=memory_vector),
+    ) -> int:
+        if wp.static(filling):
+            owner[found] = grain
+            partner[found] = number
+            if wp.static(history):
+                kept = memory_vector()
+                old = listed_at(old_starts, old_partner, came_from[grain], number)
+                if old >= 0:
+                    kept = old_memory[old]
+                memory[found] = kept
+        return found + 1
+
+    return note
+
+
 @kernel
 def check_room(
     starts: wp.array(dtype=int),

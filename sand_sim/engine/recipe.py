@@ -19,6 +19,7 @@ class Recipe:
         materials: grains are of more than one material.
         bodies: some grains are rigid bodies of several spheres.
         integrator: one of ``integrator.INTEGRATORS``.
+        smooth_tools: grains touch the true surfaces of some tools, not their particles.
         surfaces: what walls there are: ``plane``, ``cylinder``, ``shell``; and whether some are ``rough`` or a ``plunger``.
     """
 
@@ -27,6 +28,7 @@ class Recipe:
     materials: bool = False
     bodies: bool = False
     integrator: str = VERLET
+    smooth_tools: bool = False
     surfaces: frozenset[str] = frozenset()
 
     @property

@@ -93,4 +93,6 @@ def _filled_arrays(arrays: DemArrays) -> dict[str, tuple[wp.array, Count]]:
         for part in ("owner", "partner", "memory"):
             if getattr(contacts, part) is not None:
                 found[f"{name}.{part}"] = (getattr(contacts, part), contacts.pairs)
+    if arrays.old_touch is not None:
+        found["tool.touch"] = (arrays.touch, arrays.tool_list.pairs)
     return found

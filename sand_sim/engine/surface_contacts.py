@@ -6,7 +6,7 @@ import warp as wp
 
 from sand_sim.contact.response import build_drifting, build_meeting, memory_type
 from sand_sim.engine.act import build_act, build_acts
-from sand_sim.engine.contact_list import listed_at
+from sand_sim.engine.contact_list import build_note
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.plungers import PlungerState
 from sand_sim.engine.recipe import PLUNGER, ROUGH, SHELL, Recipe
@@ -34,35 +34,11 @@ def build_from_anchor(precision: Precision, surfaces: frozenset[str]) -> wp.Func
 @cache
 def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
     """Kernel that counts or, ``filling``, lists the surfaces and virtual spheres within reach of each grain."""
-    precision, history, surfaces = recipe.precision, recipe.history, recipe.surfaces
+    precision, surfaces = recipe.precision, recipe.surfaces
     whole4, memory_vector = precision.whole4, memory_type(recipe.contact, precision)
     from_anchor, nearest = build_from_anchor(precision, surfaces), build_nearest(surfaces)
     rows_near, columns_near, (_, _, sphere_at) = build_rows_near(), build_columns_near(), build_sphere_at()
-    rough, shell = ROUGH in surfaces, SHELL in surfaces
-
-    @wp.func
-    def note(
-        found: int,
-        grain: int,
-        number: int,
-        owner: wp.array(dtype=int),
-        partner: wp.array(dtype=int),
-        memory: wp.array(dtype=memory_vector),
-        came_from: wp.array(dtype=int),
-        old_starts: wp.array(dtype=int),
-        old_partner: wp.array(dtype=int),
-        old_memory: wp.array(dtype=memory_vector),
-    ) -> int:
-        if wp.static(filling):
-            owner[found] = grain
-            partner[found] = number
-            if wp.static(history):
-                kept = memory_vector()
-                old = listed_at(old_starts, old_partner, came_from[grain], number)
-                if old >= 0:
-                    kept = old_memory[old]
-                memory[found] = kept
-        return found + 1
+    rough, shell, note = ROUGH in surfaces, SHELL in surfaces, build_note(recipe, filling)
 
     @kernel
     def surface_search(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from sand_sim.engine.smooth_tools import SLOTS, SmoothTools
 from sand_sim.engine.tools import ToolTrack, tool_types
 from sand_sim.precision import Precision
 
@@ -17,11 +18,13 @@ class ToolBody:
         particles: centres in the tool frame, shape (n, 3) [m].
         radius: of every particle [m].
         material: index into the scene's materials.
+        triangles: outward surface that grains touch instead of the particles, shape (m, 3, 3) [m]; None for a rough tool.
     """
 
     particles: np.ndarray
     radius: float
     material: int
+    triangles: np.ndarray | None = None
 
 
 class Tools:
@@ -29,21 +32,30 @@ class Tools:
 
     Attributes:
         number: how many.
-        particles: centres in their tool's frame, vec3, shape (particles,) [m].
+        particles: centres in their tool's frame, vec3, shape (particles,) [m]; a smooth tool has the origin, once for each slot.
         tool_of: tool of each particle, int, shape (particles,).
         cell_starts: particles of cell k are ``cell_starts[k]`` to ``cell_starts[k + 1]``, int.
         shapes, states, tracks: structs of ``tools.py``, shape (tools,).
         travelled: bound of each tool's motion since the list was made, shape (tools,) [m].
         wrench, impulse: force and torque of the sand now, and over the frame, vec3d, shape (tools, 2).
         work: of the tool on the sand since the start, shape (tools,) [J].
+        smooth: surfaces of the smooth ones; None if there are none.
     """
 
     def __init__(self, bodies: list[ToolBody], reach: float, precision: Precision, device: str):
         shape_type, state_type = tool_types(precision)
         self.number = len(bodies)
-        shapes, particles, starts, tool_of = [], [], [0], []
+        shapes, particles, starts, tool_of, first_slots = [], [], [0], [], []
         for index, body in enumerate(bodies):
             shape = shape_type()
+            shape.material = body.material
+            first_slots.append(sum(map(len, particles)))
+            if body.triangles is not None:
+                shape.extent = float(np.linalg.norm(body.triangles, axis=2).max())
+                shapes.append(shape)
+                particles.append(np.zeros((SLOTS, 3)))
+                tool_of.append(np.full(SLOTS, index))
+                continue
             points = np.asarray(body.particles, float)
             cell = (body.radius + reach) * 1.001
             low = points.min(axis=0) - 0.01 * cell
@@ -53,7 +65,6 @@ class Tools:
             order = np.argsort(keys, kind="stable")
             shape.radius = body.radius
             shape.extent = float(np.linalg.norm(points, axis=1).max() + body.radius)
-            shape.material = body.material
             shape.low = precision.vec3(*low)
             shape.inverse_cell = 1.0 / cell
             shape.nx, shape.ny, shape.nz = (int(c) for c in counts)
@@ -72,6 +83,10 @@ class Tools:
         self.wrench = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
         self.impulse = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
         self.work = wp.zeros(self.number, dtype=wp.float64, device=device)
+        surfaces = [body.triangles for body in bodies]
+        self.smooth = None
+        if any(triangles is not None for triangles in surfaces):
+            self.smooth = SmoothTools(surfaces, first_slots, device)
 
     def set_tracks(self, tracks: list) -> None:
         """Give all tools their tracks (``tools.ToolTrack``)."""

@@ -1,7 +1,8 @@
 """Contacts of grains with the particles of tools.
 
 The particles of a tool lie still in the tool's frame, so their cells are laid once. A grain is brought into that frame to find
-the particles near it, and moving a tool rebuilds no list but this one.
+the particles near it, and moving a tool rebuilds no list but this one. A smooth tool has slots in place of particles, see
+``smooth_tools.py``.
 """
 
 from functools import cache
@@ -10,12 +11,14 @@ import warp as wp
 
 from sand_sim.contact.response import build_drifting, build_meeting, memory_type
 from sand_sim.engine.act import build_act, build_acts
-from sand_sim.engine.contact_list import listed_at
+from sand_sim.engine.contact_list import build_note
 from sand_sim.engine.count import count_of
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.pair_forces import build_direction
 from sand_sim.engine.recipe import Recipe
+from sand_sim.engine.smooth_tools import SLOTS
 from sand_sim.engine.tools import tool_types
+from sand_sim.engine.triangle_tree import TriangleTree, nearest_on_tree
 from sand_sim.precision import Precision
 
 SUM_BLOCK = 128  # contacts per partial sum of a wrench; fixed, so that the sum does not depend on the number of shares
@@ -41,11 +44,11 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
 
     Grains are taken where they were when the grain list was made (``origin``): what they may have moved since is in the skin.
     """
-    precision, history = recipe.precision, recipe.history
+    precision, smooth = recipe.precision, recipe.smooth_tools
     real, vec3, whole4 = precision.real, precision.vec3, precision.whole4
     memory_vector = memory_type(recipe.contact, precision)
     shape_type, state_type = tool_types(precision)
-    from_tool = build_from_tool(precision)
+    from_tool, note = build_from_tool(precision), build_note(recipe, filling)
 
     @kernel
     def tool_search(
@@ -57,6 +60,9 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         states: wp.array(dtype=state_type),
         cell_starts: wp.array(dtype=int),
         particles: wp.array(dtype=vec3),
+        trees: wp.array(dtype=TriangleTree),
+        boxes: wp.array(dtype=wp.vec3d),
+        corners: wp.array(dtype=wp.vec3d),
         quantum: real,
         skin: wp.array(dtype=wp.float64),
         across: real,
@@ -84,6 +90,27 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                 if wp.dot(away, away) > farthest * farthest:
                     continue
                 local = wp.quat_rotate_inv(state.rotation, away)
+                if wp.static(smooth):
+                    tree = trees[tool]
+                    if tree.leaves > 0:
+                        at = wp.vec3d(wp.float64(local[0]), wp.float64(local[1]), wp.float64(local[2]))
+                        limit = wp.float64(reach)
+                        distance, _normal = nearest_on_tree(tree, boxes, corners, at, limit, wp.mat33d(), wp.vec3d(), 0)
+                        if distance < limit:
+                            for slot in range(wp.static(SLOTS)):
+                                found = note(
+                                    found,
+                                    i,
+                                    tree.first_slot + slot,
+                                    owner,
+                                    partner,
+                                    memory,
+                                    came_from,
+                                    old_starts,
+                                    old_partner,
+                                    old_memory,
+                                )
+                        continue
                 cell = (local - shape.low) * shape.inverse_cell
                 x = int(wp.floor(cell[0]))
                 y = int(wp.floor(cell[1]))
@@ -101,16 +128,9 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                     for j in range(cell_starts[line + left], cell_starts[line + right + 1]):
                         apart = local - particles[j]
                         if wp.dot(apart, apart) < reach * reach:
-                            if wp.static(filling):
-                                owner[found] = i
-                                partner[found] = j
-                                if wp.static(history):
-                                    kept = memory_vector()
-                                    old = listed_at(old_starts, old_partner, came_from[i], j)
-                                    if old >= 0:
-                                        kept = old_memory[old]
-                                    memory[found] = kept
-                            found += 1
+                            found = note(
+                                found, i, j, owner, partner, memory, came_from, old_starts, old_partner, old_memory
+                            )
             if wp.static(not filling):
                 counts[i] = found
 
@@ -119,14 +139,17 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
 
 @cache
 def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
-    """Kernel for the forces between grains and tool particles; the tool is immovable for the law (m* is the grain's mass)."""
+    """Kernel for the forces between grains and tool particles; the tool is immovable for the law (m* is the grain's mass).
+
+    The surface of a smooth tool is flat for the law (R* is the grain's radius), as that of a wall.
+    """
     precision, rotation, materials = recipe.precision, recipe.rotation, recipe.materials
     real, vec3, vec4, whole4 = precision.real, precision.vec3, precision.vec4, precision.whole4
     types, memory_vector = recipe.contact.types(precision), memory_type(recipe.contact, precision)
     shape_type, state_type = tool_types(precision)
     from_tool, direction = build_from_tool(precision), build_direction(precision)
     meeting, acts = build_meeting(precision), build_acts(recipe)
-    drifting, halves = build_drifting(precision), recipe.halves
+    drifting, halves, smooth = build_drifting(precision), recipe.halves, recipe.smooth_tools
     act, release = build_act(recipe, measuring)
 
     @kernel
@@ -150,6 +173,7 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
         states: wp.array(dtype=state_type),
         particles: wp.array(dtype=vec3),
         tool_of: wp.array(dtype=int),
+        touch: wp.array(dtype=vec4),
         lever: wp.array(dtype=vec3),
         memory: wp.array(dtype=memory_vector),
         force: wp.array(dtype=vec3),
@@ -169,11 +193,26 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
             apart = from_tool(here, state, quantum) - arm
             radius = real(here[3]) * quantum
             reach = radius + shape.radius
-            if acts(contact, wp.dot(apart, apart) < reach * reach, memory):
+            touching = wp.dot(apart, apart) < reach * reach
+            if wp.static(smooth):
+                if shape.radius == real(0.0):
+                    touching = touch[contact][3] > real(0.0)
+            if acts(contact, touching, memory):
                 normal, distance = direction(apart)
                 overlap = reach - distance
                 half = real(0.5) * overlap
                 point = arm + normal * (shape.radius - half)
+                law_radius = radius * shape.radius / reach
+                least = wp.min(radius, shape.radius)
+                if wp.static(smooth):
+                    if shape.radius == real(0.0):
+                        met_at = touch[contact]
+                        normal = wp.quat_rotate(state.rotation, vec3(met_at[0], met_at[1], met_at[2]))
+                        overlap = met_at[3]
+                        half = overlap  # all of it lies on the grain's side of the contact point
+                        point = apart - normal * (radius - overlap)
+                        law_radius = radius
+                        least = radius
                 of_i = motion[i]
                 velocity = vec3(of_i[0], of_i[1], of_i[2]) - state.velocity - wp.cross(state.spin, point)
                 turning = -state.spin
@@ -181,9 +220,7 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     spin_i = vec3(spin[i][0], spin[i][1], spin[i][2])
                     turning += spin_i
                     velocity -= wp.cross(spin_i, normal) * (radius - half)
-                met = meeting(
-                    normal, overlap, velocity, turning, radius * shape.radius / reach, wp.min(radius, shape.radius), of_i[3]
-                )
+                met = meeting(normal, overlap, velocity, turning, law_radius, least, of_i[3])
                 if wp.static(halves):
                     past = half_motion[i] - state.velocity - wp.cross(state.spin, point)
                     past -= wp.cross(half_spin[i], normal) * (radius - half)

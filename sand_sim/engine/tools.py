@@ -26,8 +26,8 @@ def tool_types(precision: Precision):
 
     @wp.struct
     class ToolShape:
-        radius: real  # [m] of each particle
-        extent: real  # [m] farthest particle surface from the tool frame's origin
+        radius: real  # [m] of each particle, 0 for a smooth tool
+        extent: real  # [m] farthest point of its surface from the tool frame's origin
         material: int
         low: vec3  # [m] tool frame, lower corner of the particle cells
         inverse_cell: real  # [1/m]
@@ -46,6 +46,17 @@ def tool_types(precision: Precision):
     return ToolShape, ToolState
 
 
+@wp.func
+def rotation_at(track: ToolTrack, time: wp.float64) -> wp.quatd:
+    """Tool frame to world frame at a time [s]; before and after its track a tool rests."""
+    passed = wp.clamp(time, track.begin_time, track.end_time) - track.begin_time
+    rotation = track.begin_rotation
+    rate = wp.length(track.spin)
+    if rate > wp.float64(0.0):
+        rotation = wp.quat_from_axis_angle(track.spin / rate, rate * passed) * rotation
+    return rotation
+
+
 @cache
 def build_tool_state_at(precision: Precision) -> wp.Function:
     """Warp function ``(track, time, centre, inverse_quantum, end) -> ToolState``; before and after its track a tool rests.
@@ -61,10 +72,7 @@ def build_tool_state_at(precision: Precision) -> wp.Function:
     ) -> state_type:
         passed = wp.clamp(time, track.begin_time, track.end_time) - track.begin_time
         position = (track.begin_position + track.velocity * passed - centre) * inverse_quantum
-        rotation = track.begin_rotation
-        rate = wp.length(track.spin)
-        if rate > wp.float64(0.0):
-            rotation = wp.quat_from_axis_angle(track.spin / rate, rate * passed) * rotation
+        rotation = rotation_at(track, time)
         state = state_type()
         state.place = whole3(
             whole(wp.rint(wp.clamp(position[0], -end, end))),

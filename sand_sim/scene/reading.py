@@ -15,6 +15,8 @@ from sand_sim.scene.reading_boundaries import read_boundary, read_corners
 from sand_sim.scene.reading_poses import read_pose
 from sand_sim.scene.shapes import SPHERE, TETRAHEDRON
 from sand_sim.scene.types import (
+    ROUGH,
+    SMOOTH,
     Fill,
     Liquid,
     Material,
@@ -181,7 +183,7 @@ def _fill(entry: Field, folder: Path) -> Fill:
 
 def _tool(name: str, entry: Field) -> Tool:
     entry.keys(
-        ("mesh", "material", "particle_radius", "particle_spacing", "scale", "pose", "max_speed", "trajectory"),
+        ("mesh", "material", "particle_radius", "particle_spacing", "contact", "scale", "pose", "max_speed", "trajectory"),
         required=("mesh", "material", "particle_radius"),
     )
     if not name.isidentifier():
@@ -201,6 +203,7 @@ def _tool(name: str, entry: Field) -> Tool:
         material=entry["material"].text(),
         particle_radius=entry["particle_radius"].number(above=0.0, unit="m"),
         particle_spacing=entry.optional("particle_spacing", lambda f: f.number(above=0.0, unit="m"), None),
+        contact=entry.optional("contact", lambda f: f.choice((ROUGH, SMOOTH)), ROUGH),
         scale=entry.optional("scale", lambda f: f.number(above=0.0), 1.0),
         pose=entry.optional("pose", read_pose, initial),
         max_speed=entry.optional("max_speed", lambda f: f.number(above=0.0, most=1e4, unit="m/s"), 2.0),

@@ -31,7 +31,7 @@ from sand_sim.contact.law import PairNumbers
 from sand_sim.contact.model import ContactModel
 from sand_sim.integrator import VERLET
 from sand_sim.scene.pairing import pair_numbers
-from sand_sim.scene.types import Scene
+from sand_sim.scene.types import SMOOTH, Scene
 
 DEEP = 0.1  # overlap over radius up to which a step shall be stable; deeper ones are reported as not to be trusted
 
@@ -110,19 +110,20 @@ def network_steps(scene: Scene, smallest: dict[str, float], spacings: Sequence[f
     Args:
         scene: materials, pairs, boundaries, tools.
         smallest: smallest grain radius of each grain material [m].
-        spacings: of the particles of each tool, then of each terrain, in the order of the scene [m].
+        spacings: of the particles of each rough tool, then of each terrain, in the order of the scene [m].
         depth: overlap over radius up to which contacts shall be stable [1].
     """
     named = {m.name: m for m in scene.materials}
     rotation = scene.contact.rotation
-    sampled = [(tool.material, tool.particle_radius) for tool in scene.tools]
+    sampled = [(tool.material, tool.particle_radius) for tool in scene.tools if tool.contact != SMOOTH]
     sampled += [(wall.material, wall.terrain.particle_radius) for wall in scene.boundaries if wall.terrain]
     layers = [(*body, spacing) for body, spacing in zip(sampled, spacings, strict=True)]
+    flat = [*scene.boundaries, *(tool for tool in scene.tools if tool.contact == SMOOTH)]
     layers += [(wall.material, wall.rough.radius, wall.rough.spacing) for wall in scene.boundaries if wall.rough]
     for grain, radius in smallest.items():
         mass, overlap = named[grain].density * 4.0 / 3.0 * math.pi * radius**3, depth * radius
         meetings = [(other, 0.5 * radius, 0.5 * mass, grain_share(rotation)) for other in smallest]
-        meetings += [(wall.material, radius, mass, surface_share(rotation)) for wall in scene.boundaries]
+        meetings += [(wall.material, radius, mass, surface_share(rotation)) for wall in flat]
         for material, particle, spacing in layers:
             touched = max(SURFACE_CONTACTS, particles_touched(radius, particle, spacing, overlap))
             meetings.append((material, radius * particle / (radius + particle), mass, surface_share(rotation, touched)))

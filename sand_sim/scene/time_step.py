@@ -99,7 +99,7 @@ def choose_time_step(
         scene: materials and the step asked for.
         smallest: smallest grain radius of each grain material [m].
         speed: fastest relative speed to expect [m/s].
-        spacings: of the particles of each tool, then of each terrain, in the order of the scene [m].
+        spacings: of the particles of each rough tool, then of each terrain, in the order of the scene [m].
         depth: overlap over radius up to which contacts shall be stable [1].
 
     Raises:

@@ -11,6 +11,7 @@ from sand_sim.integrator import VERLET
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w as in geometry_msgs
+ROUGH, SMOOTH = "rough", "smooth"  # whether grains touch a tool's particles or its true surface
 
 
 class SceneError(ValueError):
@@ -170,13 +171,14 @@ class Body:
 
 @dataclass(frozen=True)
 class Tool:
-    """A driven rigid body, made of particles sampled from a mesh."""
+    """A driven rigid body: grains touch particles sampled from a mesh, or the mesh itself."""
 
     name: str
     mesh: str
     material: str
     particle_radius: float  # [m]
     particle_spacing: float | None = None  # [m]; None: chosen from radius and grains
+    contact: str = ROUGH  # or SMOOTH
     scale: float = 1.0  # [m per mesh unit]
     pose: Pose = Pose()
     max_speed: float = 2.0  # [m/s] of any point of the tool; faster commands are rejected

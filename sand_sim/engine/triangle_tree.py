@@ -1,0 +1,165 @@
+"""The surface of a smooth tool: its triangles in a tree of boxes, and the point of it that is nearest to a grain.
+
+All in double precision and in the tool's frame, so that overlaps, which are tiny differences of large numbers, are exact.
+"""
+
+import math
+
+import numpy as np
+import warp as wp
+
+_IN_LEAF = 4  # triangles at most
+_MERGED = math.cos(math.radians(30.0))
+
+
+@wp.struct
+class TriangleTree:
+    """A complete binary tree of boxes: node 1 is the root, nodes 2 k and 2 k + 1 are below node k, the last ``leaves`` are leaves."""
+
+    leaves: int  # a power of two; 0 for a tool without a tree
+    first_node: int
+    triangles: int
+    first_triangle: int
+    first_slot: int  # contacts are listed under partner numbers from here on
+
+
+def plant_tree(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Order triangles by halving them again and again along the longest extent of their centres.
+
+    Args:
+        triangles: corners, shape (n, 3, 3) [m]; those without area are left out.
+
+    Returns:
+        Corners in the order of the leaves, of which leaf k of m holds numbers ``n k // m`` to ``n (k + 1) // m``, shape (n, 3, 3)
+        [m]; lower and upper corner of each node's box, shape (2 m, 2, 3) [m].
+    """
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    triangles = triangles[np.einsum("ij,ij->i", cross, cross) > 0.0]
+    number = len(triangles)
+    levels = max(0, math.ceil(math.log2(number / _IN_LEAF)))
+    centres, order = triangles.mean(axis=1), np.arange(number)
+    for level in range(levels):
+        starts = number * np.arange(2**level) // 2**level
+        segment = np.repeat(np.arange(2**level), np.diff(starts, append=number))
+        sorted_ = centres[order]
+        axis = np.argmax(np.maximum.reduceat(sorted_, starts) - np.minimum.reduceat(sorted_, starts), axis=1)
+        order = order[np.lexsort((sorted_[np.arange(number), axis[segment]], segment))]
+    leaves = 2**levels
+    starts, triangles = number * np.arange(leaves) // leaves, triangles[order]
+    boxes = np.zeros((2 * leaves, 2, 3))
+    boxes[leaves:, 0] = np.minimum.reduceat(triangles.min(axis=1), starts)
+    boxes[leaves:, 1] = np.maximum.reduceat(triangles.max(axis=1), starts)
+    for level in reversed(range(levels)):
+        below = boxes[2 ** (level + 1) : 2 ** (level + 2)].reshape(-1, 2, 2, 3)
+        boxes[2**level : 2 ** (level + 1), 0] = below[:, :, 0].min(axis=1)
+        boxes[2**level : 2 ** (level + 1), 1] = below[:, :, 1].max(axis=1)
+    return triangles, boxes
+
+
+@wp.func
+def nearest_on_triangle(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
+    """Distance [m] of a point from a triangle, and unit vector to it from the closest point; behind the face both are negative.
+
+    Regions as in Ericson 2005 (Real-Time Collision Detection), 5.1.5.
+    """
+    zero = wp.float64(0.0)
+    ab = b - a
+    ac = c - a
+    ap = p - a
+    bp = p - b
+    cp = p - c
+    d1 = wp.dot(ab, ap)
+    d2 = wp.dot(ac, ap)
+    d3 = wp.dot(ab, bp)
+    d4 = wp.dot(ac, bp)
+    d5 = wp.dot(ab, cp)
+    d6 = wp.dot(ac, cp)
+    of_a = d3 * d6 - d5 * d4
+    of_b = d5 * d2 - d1 * d6
+    of_c = d1 * d4 - d3 * d2
+    normal = wp.normalize(wp.cross(ab, ac))
+    distance = wp.dot(normal, ap)
+    away = ap
+    inside = int(0)
+    if d1 <= zero and d2 <= zero:
+        away = ap
+    elif d3 >= zero and d4 <= d3:
+        away = bp
+    elif d6 >= zero and d5 <= d6:
+        away = cp
+    elif of_c <= zero and d1 >= zero and d3 <= zero:
+        away = ap - ab * (d1 / (d1 - d3))
+    elif of_b <= zero and d2 >= zero and d6 <= zero:
+        away = ap - ac * (d2 / (d2 - d6))
+    elif of_a <= zero and d4 >= d3 and d5 >= d6:
+        away = bp - (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)))
+    else:
+        inside = 1
+    if inside == 0:
+        distance = wp.length(away)
+        if distance > zero:
+            normal = away / distance
+    return distance, normal
+
+
+@wp.func
+def is_merged(away: wp.vec3d, distance: wp.float64, normals: wp.mat33d, distances: wp.vec3d, number: int) -> bool:
+    """Whether a place of the surface belongs to one of the contacts found before.
+
+    It does where its direction is within 30 degrees of the contact's, so that the facets of a rounded hollow are one contact; and
+    where it lies no higher than the contact's tangent plane, which goes for all of a surface that is flat or bulges there.
+    """
+    merged = int(0)
+    for k in range(number):
+        along = wp.dot(away, normals[k])
+        if along > wp.float64(wp.static(_MERGED)) * distance or along > wp.float64(0.999999) * distances[k]:
+            merged = 1
+    return merged > 0
+
+
+@wp.func
+def nearest_on_tree(
+    tree: TriangleTree,
+    boxes: wp.array(dtype=wp.vec3d),
+    corners: wp.array(dtype=wp.vec3d),
+    p: wp.vec3d,
+    limit: wp.float64,
+    normals: wp.mat33d,
+    distances: wp.vec3d,
+    number: int,
+):
+    """Distance [m] of the nearest place that belongs to none of the ``number`` contacts found before, and its normal.
+
+    The distance is negative behind a face, and ``limit`` where nothing is nearer.
+    """
+    least = limit
+    nearest = limit
+    normal = wp.vec3d(wp.float64(0.0))
+    node = int(1)
+    while node > 0:
+        low = boxes[2 * (tree.first_node + node)]
+        high = boxes[2 * (tree.first_node + node) + 1]
+        gap = wp.max(wp.max(low - p, p - high), wp.vec3d(wp.float64(0.0)))
+        near = wp.dot(gap, gap) < least * least
+        if near and node < tree.leaves:
+            node = 2 * node
+        else:
+            if near:
+                leaf = node - tree.leaves
+                first = int(wp.int64(tree.triangles) * wp.int64(leaf) // wp.int64(tree.leaves))
+                last = int(wp.int64(tree.triangles) * wp.int64(leaf + 1) // wp.int64(tree.leaves))
+                for k in range(tree.first_triangle + first, tree.first_triangle + last):
+                    distance, way = nearest_on_triangle(p, corners[3 * k], corners[3 * k + 1], corners[3 * k + 2])
+                    if wp.abs(distance) < least:
+                        # Further contacts are in front of their faces, or a wall's back would count beside its front.
+                        behind = distance < wp.float64(0.0)
+                        if number == 0 or not (behind or is_merged(way * distance, distance, normals, distances, number)):
+                            least = wp.abs(distance)
+                            nearest = distance
+                            normal = way
+            node += 1
+            while node % 2 == 0:
+                node = node // 2
+            if node == 1:
+                node = 0
+    return nearest, normal
