@@ -6,7 +6,17 @@ from functools import partial
 
 import warp as wp
 
-from sand_sim.engine import body_motion, finish, motion, neighbours, pair_forces, plungers, smooth_tools, surface_contacts, tool_contacts
+from sand_sim.engine import (
+    body_motion,
+    finish,
+    motion,
+    neighbours,
+    pair_forces,
+    plungers,
+    smooth_tools,
+    surface_contacts,
+    tool_contacts,
+)
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_lay_cells
 from sand_sim.engine.contact_list import ContactList, record_count, record_fill

@@ -128,9 +128,7 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                     for j in range(cell_starts[line + left], cell_starts[line + right + 1]):
                         apart = local - particles[j]
                         if wp.dot(apart, apart) < reach * reach:
-                            found = note(
-                                found, i, j, owner, partner, memory, came_from, old_starts, old_partner, old_memory
-                            )
+                            found = note(found, i, j, owner, partner, memory, came_from, old_starts, old_partner, old_memory)
             if wp.static(not filling):
                 counts[i] = found
 

@@ -14,7 +14,7 @@ _MERGED = math.cos(math.radians(30.0))
 
 @wp.struct
 class TriangleTree:
-    """A complete binary tree of boxes: node 1 is the root, nodes 2 k and 2 k + 1 are below node k, the last ``leaves`` are leaves."""
+    """A complete binary tree of boxes: nodes 2 k and 2 k + 1 are below node k, node 1 is the root, the last ``leaves`` are leaves."""
 
     leaves: int  # a power of two; 0 for a tool without a tree
     first_node: int

@@ -33,8 +33,9 @@ def tray():
     outside = np.asarray(outer.triangles)
     outside = outside[~np.all(np.isclose(outside[:, :, 2], 0.04), axis=1)]
     inside = np.where(np.isclose(inside, 0.05), 0.04, inside)
-    a, b = np.array([[-0.002, -0.002], [0.082, -0.002], [0.082, 0.062], [-0.002, 0.062]]), np.array(
-        [[0.0, 0.0], [0.08, 0.0], [0.08, 0.06], [0.0, 0.06]]
+    a, b = (
+        np.array([[-0.002, -0.002], [0.082, -0.002], [0.082, 0.062], [-0.002, 0.062]]),
+        np.array([[0.0, 0.0], [0.08, 0.0], [0.08, 0.06], [0.0, 0.06]]),
     )
     rim = []
     for k in range(4):
@@ -112,7 +113,7 @@ def test_sphere_slides_down_a_plate_of_triangles_as_coulomb_says(make_smooth_wor
 
 
 def test_ball_rolls_over_a_plate_of_triangles_as_over_a_wall(make_smooth_world):
-    """``5/7 g sin a``, held by one and the same tangential spring over all triangles and lists; a thin skin makes many of these."""
+    """``5/7 g sin a``, held by one and the same spring over all triangles and lists; a thin skin makes many of these."""
     angle = 0.3
     start = [-0.03, 0.002, RADIUS - resting_overlap(MASS * GRAVITY * np.cos(angle))]
     common = {"gravity": incline(angle), "friction": 0.5, "skin": 0.0005}
