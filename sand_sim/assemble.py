@@ -189,8 +189,7 @@ def _rough(tools: list[ToolModel]) -> list[ToolModel]:
 
 
 def _tool_body(tool: ToolModel, order: list[str]) -> ToolBody:
-    surface = tool.body.triangles if tool.smooth else None
-    return ToolBody(tool.body.points, tool.body.radius, order.index(tool.tool.material), surface)
+    return ToolBody(tool.body.points, tool.body.radius, order.index(tool.tool.material), tool.surface)
 
 
 def _loose_materials(scene: Scene) -> set[str]:

@@ -29,6 +29,7 @@ class Plan:
     Attributes:
         grains, spheres: numbers.
         kept: stages with when they run.
+        tools: by name, whether grains touch their particles (``rough``) or their true surfaces (``smooth``).
         left_out: what is neither compiled nor allocated, with the reason.
         kernels: names of the compiled kernels.
         arrays: bytes by array.
@@ -42,6 +43,7 @@ class Plan:
     grains: int
     spheres: int
     kept: dict[str, str]
+    tools: dict[str, str]
     left_out: dict[str, str]
     kernels: list[str]
     arrays: dict[str, int]
@@ -72,6 +74,7 @@ def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
         grains=assembly.table.grains,
         spheres=spheres,
         kept=kept,
+        tools={tool.name: tool.contact for tool in scene.tools},
         left_out=left_out(assembly),
         kernels=sorted(one.key.rsplit("__", 1)[-1] for one in list_kernels(arrays, solver.stages, solver.device)),
         arrays=sizes,
@@ -97,6 +100,7 @@ def left_out(assembly: Assembly) -> dict[str, str]:
         "half-step velocities": None if recipe.integrator == VERLET else f"solver.integrator is '{recipe.integrator}'",
         "walls": None if assembly.walls else "the scene has no boundaries",
         "tools": None if scene.tools else "the scene has no tools",
+        "true surfaces of tools": None if recipe.smooth_tools else "no tool has contact 'smooth'",
         "settling": None if scene.settle.time > 0.0 else "settle.time is 0",
     }
     return {what: why for what, why in reasons.items() if why}

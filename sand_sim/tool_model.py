@@ -8,28 +8,33 @@ import numpy as np
 import trimesh
 
 from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_file
+from sampler.surface import Surface
 from sand_sim import rotation
 from sand_sim.scene.shapes import shape_named
 from sand_sim.scene.types import SMOOTH, Scene, SceneError, Tool
 
 Progress = Callable[[str, float], None]
 
+_NEAR = 1e-5  # of the diagonal: where sides of a triangle are looked at
+
 
 @dataclass(frozen=True)
 class ToolModel:
     """A tool with its mesh and its particles, both in the tool frame [m].
 
-    Grains touch its particles if it is rough, and the mesh as repaired, ``body.triangles``, if it is smooth.
+    Grains touch its particles if it is rough, and the triangles of its ``surface``, shape (n, 3, 3) [m], if it is smooth, which
+    are those of the mesh as repaired.
     """
 
     tool: Tool
     mesh: trimesh.Trimesh
     body: ParticleBody
+    surface: np.ndarray | None = None
 
     @property
     def smooth(self) -> bool:
         """Whether grains touch the mesh itself."""
-        return self.tool.contact == SMOOTH
+        return self.surface is not None
 
     @property
     def margin(self) -> float:
@@ -39,7 +44,7 @@ class ToolModel:
     @property
     def extent(self) -> float:
         """Farthest point of its surface from the tool frame's origin [m]."""
-        points = self.body.triangles.reshape(-1, 3) if self.smooth else self.body.points
+        points = self.body.points if self.surface is None else self.surface.reshape(-1, 3)
         return float(np.linalg.norm(points, axis=1).max() + self.margin)
 
     @property
@@ -83,7 +88,19 @@ def model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
         body = sample_file(path, tool.particle_radius, tool.scale, grain=grain, spacing=spacing, progress=show)
     except MeshError as error:
         raise SceneError(f"tools.{tool.name}.mesh: {error}") from None
-    return ToolModel(tool, mesh, body)
+    return ToolModel(tool, mesh, body, _outward(body.triangles) if tool.contact == SMOOTH else None)
+
+
+def _outward(triangles: np.ndarray) -> np.ndarray:
+    """Triangles turned so that all look out of the solid; those of badly damaged meshes that have it on no side look both ways.
+
+    A grain just outside a triangle that looks the wrong way would be taken for one that is deep inside the tool.
+    """
+    around = Surface(triangles)
+    centres, step = triangles.mean(axis=1), _NEAR * around.unit * around.normals
+    solid_before, solid_behind = (np.abs(around.winding(centres + side * step)) > 0.5 for side in (1.0, -1.0))
+    turned = np.where((solid_before & ~solid_behind)[:, None, None], triangles[:, ::-1], triangles)
+    return np.concatenate([turned, triangles[~solid_before & ~solid_behind][:, ::-1]])
 
 
 def _smallest_grain(scene: Scene) -> float | None:

@@ -57,6 +57,21 @@ def test_frictionless_kernels_contain_no_code_of_what_was_left_out(make_world):
     assert lines(contact={"tangential": "none"}) < 0.7 * lines()
 
 
+def test_smooth_tools_are_left_out_where_all_are_rough(tmp_path):
+    path = write_small_scene(tmp_path)
+    parsed = yaml.safe_load(path.read_text())
+    rough = make_plan(assemble(read_scene(parsed, tmp_path)), measure=False)
+    parsed["tools"]["plate"]["contact"] = "smooth"
+    smooth = make_plan(assemble(read_scene(parsed, tmp_path)), measure=False)
+    assert {"touch_smooth", "carry_touch"} == set(smooth.kernels) - set(rough.kernels)
+    assert set(rough.kernels) <= set(smooth.kernels) | {"put_back"}
+    assert {name.split(".")[-1] for name in set(smooth.arrays) - set(rough.arrays)} >= {"touch", "corners", "boxes"}
+    assert "true surfaces of tools" in rough.left_out
+    assert "true surfaces of tools" not in smooth.left_out
+    assert rough.tools == {"plate": "rough"}
+    assert smooth.tools == {"plate": "smooth"}
+
+
 def test_clumps_are_counted_as_grains_and_spheres(tmp_path):
     path = write_small_scene(tmp_path)
     fill = {"material": "sand", "shape": TETRAHEDRON, "radius": 0.004, "count": 20}

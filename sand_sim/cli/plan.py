@@ -10,6 +10,9 @@ from sand_sim.config_folder import find_scene
 from sand_sim.interruption import Interruption
 from sand_sim.plan import Plan, make_plan
 from sand_sim.scene.reading import load_scene
+from sand_sim.scene.types import ROUGH, SMOOTH
+
+_TOUCHED = {ROUGH: "rough: particles of its mesh", SMOOTH: "smooth: the true surface of its mesh"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,6 +40,8 @@ def plan_text(plan: Plan) -> str:
     """A plan to read."""
     lines = [f"{plan.grains:,} grains, {plan.spheres:,} spheres", "", "stages kept"]
     lines += [f"  {name:32} {when}" for name, when in plan.kept.items()]
+    lines += ["", "tools: what grains touch"] if plan.tools else []
+    lines += [f"  {name:32} {_TOUCHED[contact]}" for name, contact in plan.tools.items()]
     lines += ["", "left out: no code compiled, no memory taken"]
     lines += [f"  {name:32} {why}" for name, why in plan.left_out.items()]
     lines += ["", f"arrays: {plan.bytes_per_sphere:.0f} bytes per sphere, {sum(plan.arrays.values()) / 1e6:.1f} MB in all"]

@@ -14,7 +14,7 @@ _MERGED = math.cos(math.radians(30.0))
 
 @wp.struct
 class TriangleTree:
-    """A complete binary tree of boxes: nodes 2 k and 2 k + 1 are below node k, node 1 is the root, the last ``leaves`` are leaves."""
+    """A complete binary tree of boxes: nodes 2 k and 2 k + 1 are below node k, 1 is the root, the last ``leaves`` are leaves."""
 
     leaves: int  # a power of two; 0 for a tool without a tree
     first_node: int
@@ -140,7 +140,7 @@ def nearest_on_tree(
         low = boxes[2 * (tree.first_node + node)]
         high = boxes[2 * (tree.first_node + node) + 1]
         gap = wp.max(wp.max(low - p, p - high), wp.vec3d(wp.float64(0.0)))
-        near = wp.dot(gap, gap) < least * least
+        near = wp.dot(gap, gap) <= least * least * wp.float64(1.000001)  # a wall's other side is just as far
         if near and node < tree.leaves:
             node = 2 * node
         else:
@@ -150,7 +150,8 @@ def nearest_on_tree(
                 last = int(wp.int64(tree.triangles) * wp.int64(leaf + 1) // wp.int64(tree.leaves))
                 for k in range(tree.first_triangle + first, tree.first_triangle + last):
                     distance, way = nearest_on_triangle(p, corners[3 * k], corners[3 * k + 1], corners[3 * k + 2])
-                    if wp.abs(distance) < least:
+                    # Of a wall without thickness, which is there both ways, the side that faces the grain.
+                    if wp.abs(distance) < least or (wp.abs(distance) == least and distance > nearest):
                         # Further contacts are in front of their faces, or a wall's back would count beside its front.
                         behind = distance < wp.float64(0.0)
                         if number == 0 or not (behind or is_merged(way * distance, distance, normals, distances, number)):

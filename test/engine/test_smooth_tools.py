@@ -112,6 +112,27 @@ def test_sphere_slides_down_a_plate_of_triangles_as_coulomb_says(make_smooth_wor
     assert gained == pytest.approx(GRAVITY * (np.sin(angle) - friction * np.cos(angle)), rel=tolerance)
 
 
+@pytest.mark.parametrize(
+    "further",
+    [
+        {},
+        {"contact": {"cohesion": "capillary"}, "liquid": {"saturation": 0.2}, "integrator": "symplectic_euler"},
+        {"contact": {"rolling": "spring", "cohesion": "jkr"}, "numbers": {"rolling_friction": 0.05, "adhesion": 0.2}},
+    ],
+    ids=["default", "capillary", "JKR and rolling spring"],
+)
+def test_grain_bounces_and_rolls_as_on_a_wall(make_smooth_world, further):
+    """Of every law the same as on an analytic wall, bonds across a gap and memories included."""
+    wall = [{"type": "plane", "name": "wall", "material": "wall", "point": [0.0, 0.0, 0.0], "normal": [0.0, 0.0, 1.0]}]
+    common = {"gravity": incline(0.2), "velocity": [0.1, 0.02, -0.1], "spin": [0.0, -20.0, 5.0], "skin": 0.0005}
+    common |= {"time_step": 5e-6} | further
+    start = [[-0.02, 0.002, 0.006]]
+    worlds = [make_smooth_world(start, plate(), **common), make_smooth_world(start, boundaries=wall, **common)]
+    tool, plane = (record(world, 30, 1000) for world in worlds)
+    for name in ("position", "velocity", "spin"):
+        assert np.abs(tool[name] - plane[name]).max() < 1e-7 * np.abs(plane[name]).max()
+
+
 def test_ball_rolls_over_a_plate_of_triangles_as_over_a_wall(make_smooth_world):
     """``5/7 g sin a``, held by one and the same spring over all triangles and lists; a thin skin makes many of these."""
     angle = 0.3
