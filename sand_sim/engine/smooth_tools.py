@@ -29,7 +29,7 @@ class SmoothTools:
     Attributes:
         trees: structs, shape (tools,), without leaves for a rough tool.
         boxes: lower and upper corner of each node, tree after tree, vec3d, shape (2 nodes,) [m].
-        corners: three of each triangle, in their tool's frame, vec3d, shape (3 triangles,) [m].
+        corners: three of each triangle [m] and its unit normal, in the tool's frame, vec3d, shape (4 triangles,).
     """
 
     def __init__(self, surfaces: list[np.ndarray | None], first_slots: list[int], device: str):

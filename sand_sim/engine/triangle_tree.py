@@ -30,11 +30,12 @@ def plant_tree(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         triangles: corners, shape (n, 3, 3) [m]; those without area are left out.
 
     Returns:
-        Corners in the order of the leaves, of which leaf k of m holds numbers ``n k // m`` to ``n (k + 1) // m``, shape (n, 3, 3)
-        [m]; lower and upper corner of each node's box, shape (2 m, 2, 3) [m].
+        Corners [m] and unit normals in the order of the leaves, of which leaf k of m holds numbers ``n k // m`` to
+        ``n (k + 1) // m``, shape (n, 4, 3); lower and upper corner of each node's box, shape (2 m, 2, 3) [m].
     """
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    triangles = triangles[np.einsum("ij,ij->i", cross, cross) > 0.0]
+    length = np.linalg.norm(cross, axis=1)
+    triangles, normals = triangles[length > 0.0], cross[length > 0.0] / length[length > 0.0, None]
     number = len(triangles)
     levels = max(0, math.ceil(math.log2(number / _IN_LEAF)))
     centres, order = triangles.mean(axis=1), np.arange(number)
@@ -53,14 +54,15 @@ def plant_tree(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         below = boxes[2 ** (level + 1) : 2 ** (level + 2)].reshape(-1, 2, 2, 3)
         boxes[2**level : 2 ** (level + 1), 0] = below[:, :, 0].min(axis=1)
         boxes[2**level : 2 ** (level + 1), 1] = below[:, :, 1].max(axis=1)
-    return triangles, boxes
+    return np.concatenate([triangles, normals[order][:, None]], axis=1), boxes
 
 
 @wp.func
-def nearest_on_triangle(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
-    """Distance [m] of a point from a triangle, and unit vector to it from the closest point; behind the face both are negative.
+def nearest_on_triangle(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, face: wp.vec3d):
+    """Distance [m] of a point from a triangle with unit normal ``face``, and unit vector to the point from the closest one.
 
-    Regions as in Ericson 2005 (Real-Time Collision Detection), 5.1.5.
+    Right behind the face the distance is negative and the vector that of the face. Regions as in Ericson 2005 (Real-Time
+    Collision Detection), 5.1.5.
     """
     zero = wp.float64(0.0)
     ab = b - a
@@ -77,8 +79,8 @@ def nearest_on_triangle(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d):
     of_a = d3 * d6 - d5 * d4
     of_b = d5 * d2 - d1 * d6
     of_c = d1 * d4 - d3 * d2
-    normal = wp.normalize(wp.cross(ab, ac))
-    distance = wp.dot(normal, ap)
+    normal = face
+    distance = wp.dot(face, ap)
     away = ap
     inside = int(0)
     if d1 <= zero and d2 <= zero:
@@ -134,13 +136,14 @@ def nearest_on_tree(
     """
     least = limit
     nearest = limit
+    slack = limit * wp.float64(1.0e-12)
     normal = wp.vec3d(wp.float64(0.0))
     node = int(1)
     while node > 0:
         low = boxes[2 * (tree.first_node + node)]
         high = boxes[2 * (tree.first_node + node) + 1]
         gap = wp.max(wp.max(low - p, p - high), wp.vec3d(wp.float64(0.0)))
-        near = wp.dot(gap, gap) <= least * least * wp.float64(1.000001)  # a wall's other side is just as far
+        near = wp.dot(gap, gap) < least * (least + slack)
         if near and node < tree.leaves:
             node = 2 * node
         else:
@@ -149,15 +152,19 @@ def nearest_on_tree(
                 first = int(wp.int64(tree.triangles) * wp.int64(leaf) // wp.int64(tree.leaves))
                 last = int(wp.int64(tree.triangles) * wp.int64(leaf + 1) // wp.int64(tree.leaves))
                 for k in range(tree.first_triangle + first, tree.first_triangle + last):
-                    distance, way = nearest_on_triangle(p, corners[3 * k], corners[3 * k + 1], corners[3 * k + 2])
-                    # Of a wall without thickness, which is there both ways, the side that faces the grain.
-                    if wp.abs(distance) < least or (wp.abs(distance) == least and distance > nearest):
-                        # Further contacts are in front of their faces, or a wall's back would count beside its front.
-                        behind = distance < wp.float64(0.0)
-                        if number == 0 or not (behind or is_merged(way * distance, distance, normals, distances, number)):
-                            least = wp.abs(distance)
-                            nearest = distance
-                            normal = way
+                    a = corners[4 * k]
+                    face = corners[4 * k + 3]
+                    height = wp.dot(face, p - a)
+                    # Further contacts are in front of their faces, or a wall's back would count beside its front.
+                    if wp.abs(height) < least + slack and (number == 0 or height >= wp.float64(0.0)):
+                        distance, way = nearest_on_triangle(p, a, corners[4 * k + 1], corners[4 * k + 2], face)
+                        # Of a wall without thickness, which is there both ways, the side that faces the grain.
+                        before = wp.abs(distance) < least + slack and distance > nearest and nearest < wp.float64(0.0)
+                        if wp.abs(distance) < least or before:
+                            if number == 0 or not is_merged(way * distance, distance, normals, distances, number):
+                                least = wp.abs(distance)
+                                nearest = distance
+                                normal = way
             node += 1
             while node % 2 == 0:
                 node = node // 2

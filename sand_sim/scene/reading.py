@@ -203,7 +203,7 @@ def _tool(name: str, entry: Field) -> Tool:
         material=entry["material"].text(),
         particle_radius=entry["particle_radius"].number(above=0.0, unit="m"),
         particle_spacing=entry.optional("particle_spacing", lambda f: f.number(above=0.0, unit="m"), None),
-        contact=entry.optional("contact", lambda f: f.choice((ROUGH, SMOOTH)), ROUGH),
+        contact=entry.optional("contact", lambda f: f.choice((ROUGH, SMOOTH)), Tool.contact),
         scale=entry.optional("scale", lambda f: f.number(above=0.0), 1.0),
         pose=entry.optional("pose", read_pose, initial),
         max_speed=entry.optional("max_speed", lambda f: f.number(above=0.0, most=1e4, unit="m/s"), 2.0),
