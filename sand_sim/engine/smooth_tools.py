@@ -180,3 +180,24 @@ def build_carry_touch(precision: Precision) -> wp.Kernel:
             touch[contact] = kept
 
     return carry_touch
+
+
+def arguments_of(smooth: SmoothTools | None) -> list:
+    """Kernel arguments, also where there are none."""
+    return [smooth.trees, smooth.boxes, smooth.corners] if smooth else [None] * 3
+
+
+def record_touching(arrays, recorder) -> None:
+    """Record the search for the contacts of a step on the ``DemArrays`` of a world."""
+    contacts, tools = arrays.tool_list, arrays.tools
+    inputs = [contacts.owner, contacts.partner, arrays.grains.place, tools.tool_of, tools.states, tools.tracks]
+    inputs += [*arguments_of(tools.smooth), arrays.flags.steps_done, arrays.setting.dt, arrays.lattice.quantum]
+    inputs += [arrays.setting.reach, arrays.touch, contacts.memory]
+    recorder.each(build_touch_smooth(arrays.recipe), contacts.pairs, inputs)
+
+
+def record_carrying(arrays, recorder) -> None:
+    """Record how a new list takes over what the slots held."""
+    contacts = arrays.tool_list
+    inputs = [contacts.owner, contacts.partner, arrays.grains.came_from, contacts.old_starts, contacts.old_partner]
+    recorder.each(build_carry_touch(arrays.recipe.precision), contacts.pairs, [*inputs, arrays.old_touch, arrays.touch])

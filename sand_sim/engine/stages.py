@@ -6,21 +6,12 @@ from functools import partial
 
 import warp as wp
 
-from sand_sim.engine import (
-    body_motion,
-    finish,
-    motion,
-    neighbours,
-    pair_forces,
-    plungers,
-    smooth_tools,
-    surface_contacts,
-    tool_contacts,
-)
+from sand_sim.engine import body_motion, finish, motion, neighbours, pair_forces, plungers, surface_contacts, tool_contacts
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_lay_cells
 from sand_sim.engine.contact_list import ContactList, record_count, record_fill
 from sand_sim.engine.skin import adapt_skin, narrow_skin
+from sand_sim.engine.smooth_tools import arguments_of, record_carrying, record_touching
 from sand_sim.engine.sorting import record_sort
 
 
@@ -156,19 +147,23 @@ def tool_list_stage(arrays: DemArrays, recorder) -> None:
     grains, tools, flags = arrays.grains, arrays.tools, arrays.flags
 
     def search(filling):
-        inputs = [grains.origin, tools.shapes, tools.states, tools.cell_starts, tools.particles, *_surface_arguments(arrays)]
+        inputs = [
+            grains.origin,
+            tools.shapes,
+            tools.states,
+            tools.cell_starts,
+            tools.particles,
+            *arguments_of(tools.smooth),
+        ]
         inputs += [arrays.lattice.quantum, arrays.skin.width, arrays.setting.reach, *_list_arguments(arrays, arrays.tool_list)]
         recorder.each(tool_contacts.build_tool_search(arrays.recipe, filling), grains.active, inputs)
 
     def fill():
-        contacts = arrays.tool_list
         if arrays.old_touch is not None:
-            recorder.each(neighbours.build_put_back(arrays.touch.dtype), contacts.pairs, [arrays.touch, arrays.old_touch])
-        record_fill(recorder, contacts, arrays.every_start, partial(search, True))
+            recorder.each(neighbours.build_put_back(arrays.touch.dtype), arrays.tool_list.pairs, [arrays.touch, arrays.old_touch])
+        record_fill(recorder, arrays.tool_list, arrays.every_start, partial(search, True))
         if arrays.old_touch is not None:
-            inputs = [contacts.owner, contacts.partner, grains.came_from, contacts.old_starts, contacts.old_partner]
-            carry = smooth_tools.build_carry_touch(arrays.recipe.precision)
-            recorder.each(carry, contacts.pairs, [*inputs, arrays.old_touch, arrays.touch])
+            record_carrying(arrays, recorder)
         recorder.each(neighbours.number_anew, grains.active, [grains.came_from])
         recorder.once(finish.forget_travel, [tools.travelled], wait=False)
         recorder.once(finish.lower_flag, [flags.tools_moved])
@@ -201,10 +196,7 @@ def tool_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
     """Forces of tools on grains, and their sums over blocks of contacts."""
     contacts, tools = arrays.tool_list, arrays.tools
     if tools.smooth:
-        inputs = [contacts.owner, contacts.partner, arrays.grains.place, tools.tool_of, tools.states, tools.tracks]
-        inputs += [*_surface_arguments(arrays), arrays.flags.steps_done, arrays.setting.dt, arrays.lattice.quantum]
-        inputs += [arrays.setting.reach, arrays.touch, contacts.memory]
-        recorder.each(smooth_tools.build_touch_smooth(arrays.recipe), contacts.pairs, inputs)
+        record_touching(arrays, recorder)
     inputs = [*_grain_arguments(arrays, contacts), tools.shapes, tools.states, tools.particles, tools.tool_of]
     inputs += [arrays.touch, arrays.lever, *_act_arguments(arrays, "tool")]
     recorder.each(tool_contacts.build_tool_forces(arrays.recipe, measuring), contacts.pairs, inputs)
@@ -308,11 +300,6 @@ def _play(arrays: DemArrays, stages: tuple[Stage, ...], recorder) -> None:
 def _list_arguments(arrays: DemArrays, contacts: ContactList) -> list:
     written = [contacts.counts, contacts.starts, contacts.owner, contacts.partner, contacts.memory]
     return [*written, arrays.grains.came_from, contacts.old_starts, contacts.old_partner, contacts.drawer]
-
-
-def _surface_arguments(arrays: DemArrays) -> list:
-    smooth = arrays.tools.smooth
-    return [smooth.trees, smooth.boxes, smooth.corners] if smooth else [None] * 3
 
 
 def _grain_arguments(arrays: DemArrays, contacts: ContactList) -> list:
