@@ -9,8 +9,8 @@ from sand_sim.border import ToolContacts
 def observe_tool_contacts(assembly: Assembly, name: str) -> ToolContacts:
     """All contacts that act on a tool, as the solver has last measured them.
 
-    The engine keeps of each contact the force and the contact point, which lies half the overlap inside the grain. Normal and
-    overlap follow from that and the grain's centre, whatever the tool's surface is made of.
+    The engine keeps of each contact the force and the contact point, which lies inside the grain by half the overlap, or on a
+    smooth tool's surface by all of it. Normal and overlap follow from that and the grain's centre.
 
     Args:
         assembly: the world's.
@@ -33,7 +33,7 @@ def observe_tool_contacts(assembly: Assembly, name: str) -> ToolContacts:
         normal=away / distance[:, None],
         force=-force,
         couple=-moment,
-        overlap=2.0 * (place[:, 3] * lattice.quantum - distance),
+        overlap=(1.0 if assembly.tools[index].smooth else 2.0) * (place[:, 3] * lattice.quantum - distance),
         identity=assembly.grain_of_sphere[arrays.grains.identity.numpy()[row]],
     )
 

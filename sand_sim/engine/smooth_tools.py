@@ -14,6 +14,7 @@ import warp as wp
 from sand_sim.contact.response import memory_type
 from sand_sim.engine.contact_list import listed_at
 from sand_sim.engine.kernel import kernel
+from sand_sim.engine.neighbours import build_put_back
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.tools import ToolTrack, rotation_at, tool_types
 from sand_sim.engine.triangle_tree import TriangleTree, nearest_on_tree, plant_tree
@@ -190,14 +191,22 @@ def arguments_of(smooth: SmoothTools | None) -> list:
 def record_touching(arrays, recorder) -> None:
     """Record the search for the contacts of a step on the ``DemArrays`` of a world."""
     contacts, tools = arrays.tool_list, arrays.tools
-    inputs = [contacts.owner, contacts.partner, arrays.grains.place, tools.tool_of, tools.states, tools.tracks]
-    inputs += [*arguments_of(tools.smooth), arrays.flags.steps_done, arrays.setting.dt, arrays.lattice.quantum]
-    inputs += [arrays.setting.reach, arrays.touch, contacts.memory]
-    recorder.each(build_touch_smooth(arrays.recipe), contacts.pairs, inputs)
+    if tools.smooth:
+        inputs = [contacts.owner, contacts.partner, arrays.grains.place, tools.tool_of, tools.states, tools.tracks]
+        inputs += [*arguments_of(tools.smooth), arrays.flags.steps_done, arrays.setting.dt, arrays.lattice.quantum]
+        inputs += [arrays.setting.reach, arrays.touch, contacts.memory]
+        recorder.each(build_touch_smooth(arrays.recipe), contacts.pairs, inputs)
+
+
+def record_keeping(arrays, recorder) -> None:
+    """Record that what the slots hold is put aside before a new list is made."""
+    if arrays.old_touch is not None:
+        recorder.each(build_put_back(arrays.touch.dtype), arrays.tool_list.pairs, [arrays.touch, arrays.old_touch])
 
 
 def record_carrying(arrays, recorder) -> None:
-    """Record how a new list takes over what the slots held."""
+    """Record that a new list takes it over."""
     contacts = arrays.tool_list
-    inputs = [contacts.owner, contacts.partner, arrays.grains.came_from, contacts.old_starts, contacts.old_partner]
-    recorder.each(build_carry_touch(arrays.recipe.precision), contacts.pairs, [*inputs, arrays.old_touch, arrays.touch])
+    if arrays.old_touch is not None:
+        inputs = [contacts.owner, contacts.partner, arrays.grains.came_from, contacts.old_starts, contacts.old_partner]
+        recorder.each(build_carry_touch(arrays.recipe.precision), contacts.pairs, [*inputs, arrays.old_touch, arrays.touch])

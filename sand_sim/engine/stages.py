@@ -11,7 +11,7 @@ from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_lay_cells
 from sand_sim.engine.contact_list import ContactList, record_count, record_fill
 from sand_sim.engine.skin import adapt_skin, narrow_skin
-from sand_sim.engine.smooth_tools import arguments_of, record_carrying, record_touching
+from sand_sim.engine.smooth_tools import arguments_of, record_carrying, record_keeping, record_touching
 from sand_sim.engine.sorting import record_sort
 
 
@@ -159,11 +159,9 @@ def tool_list_stage(arrays: DemArrays, recorder) -> None:
         recorder.each(tool_contacts.build_tool_search(arrays.recipe, filling), grains.active, inputs)
 
     def fill():
-        if arrays.old_touch is not None:
-            recorder.each(neighbours.build_put_back(arrays.touch.dtype), arrays.tool_list.pairs, [arrays.touch, arrays.old_touch])
+        record_keeping(arrays, recorder)
         record_fill(recorder, arrays.tool_list, arrays.every_start, partial(search, True))
-        if arrays.old_touch is not None:
-            record_carrying(arrays, recorder)
+        record_carrying(arrays, recorder)
         recorder.each(neighbours.number_anew, grains.active, [grains.came_from])
         recorder.once(finish.forget_travel, [tools.travelled], wait=False)
         recorder.once(finish.lower_flag, [flags.tools_moved])
@@ -195,8 +193,7 @@ def wall_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
 def tool_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
     """Forces of tools on grains, and their sums over blocks of contacts."""
     contacts, tools = arrays.tool_list, arrays.tools
-    if tools.smooth:
-        record_touching(arrays, recorder)
+    record_touching(arrays, recorder)
     inputs = [*_grain_arguments(arrays, contacts), tools.shapes, tools.states, tools.particles, tools.tool_of]
     inputs += [arrays.touch, arrays.lever, *_act_arguments(arrays, "tool")]
     recorder.each(tool_contacts.build_tool_forces(arrays.recipe, measuring), contacts.pairs, inputs)

@@ -191,6 +191,10 @@ def test_faces_edges_and_corners_push_away_from_the_closest_point(make_smooth_wo
     force = hertz(overlap) * direction
     report = world.observe().tool("tool")
     assert report.force == pytest.approx(-force, abs=1e-8 * hertz(overlap))
+    contacts = world.tool_contacts("tool")
+    assert contacts.normal == pytest.approx(direction[None], abs=1e-9)
+    assert contacts.point == pytest.approx(edge[None], abs=1e-9)
+    assert contacts.overlap == pytest.approx([overlap], rel=1e-6)
     assert report.torque == pytest.approx(np.cross(edge, -force), abs=1e-8 * hertz(overlap) * 0.06)
 
 
