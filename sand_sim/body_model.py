@@ -1,12 +1,13 @@
 """A scene's free rigid bodies made into spheres, masses and meshes."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
-from sampler import MeshError, SignedDistance, locate_mesh, read_mesh, sample_body
+from sampler import MeshError, SignedDistance, locate_mesh, read_mesh, sample_file
 from sand_sim import rotation
 from sand_sim.grain_table import BodyTable, GrainTable
 from sand_sim.scene.clumps import members_of
@@ -80,8 +81,9 @@ def model_body(body: Body, scene: Scene, progress) -> BodyModel:
     mesh = None
     if body.mesh is not None:
         try:
-            mesh = read_mesh(locate_mesh(body.mesh, scene.folder), body.scale)
-            skin = sample_body(mesh, body.particle_radius, progress=lambda share: progress(f"sampling {body.name}", share))
+            path, show = locate_mesh(body.mesh, scene.folder), partial(progress, f"sampling {body.name}")
+            mesh = read_mesh(path, body.scale)
+            skin = sample_file(path, body.particle_radius, body.scale, thickness=body.thickness, progress=show)
         except MeshError as error:
             raise SceneError(f"{where}.mesh: {error}") from None
         if not np.isfinite(skin.volume) and body.inertia is None:

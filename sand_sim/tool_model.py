@@ -51,7 +51,8 @@ class ToolModel:
     def box(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest corner of its hull in the world at the initial pose, shape (3,) each [m]."""
         pose = self.tool.pose
-        corners = np.asarray(pose.position) + rotation.rotate(np.asarray(pose.orientation), np.asarray(self.mesh.vertices))
+        points = np.asarray(self.mesh.vertices) if self.surface is None else self.surface.reshape(-1, 3)
+        corners = np.asarray(pose.position) + rotation.rotate(np.asarray(pose.orientation), points)
         return corners.min(axis=0) - self.margin, corners.max(axis=0) + self.margin
 
     def holds(self, points: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
@@ -66,7 +67,8 @@ class ToolModel:
         """Distance of world points, shape (n, 3), from its surface at the initial pose, shape (n,) [m]."""
         pose = self.tool.pose
         local = rotation.rotate(rotation.inverse(np.asarray(pose.orientation)), position - np.asarray(pose.position))
-        return SignedDistance(self.mesh).query(local)[0] - self.margin
+        solid = self.mesh if self.surface is None else trimesh.Trimesh(**trimesh.triangles.to_kwargs(self.surface))
+        return SignedDistance(solid).query(local)[0] - self.margin
 
 
 def model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
@@ -85,13 +87,14 @@ def model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
         mesh = read_mesh(path, tool.scale)
         show = partial(progress, f"sampling {tool.name}")
         grain, spacing = None if tool.contact == SMOOTH else _smallest_grain(scene), tool.particle_spacing
-        body = sample_file(path, tool.particle_radius, tool.scale, grain=grain, spacing=spacing, progress=show)
+        options = {"grain": grain, "spacing": spacing, "thickness": tool.thickness}
+        body = sample_file(path, tool.particle_radius, tool.scale, progress=show, **options)
     except MeshError as error:
         raise SceneError(f"tools.{tool.name}.mesh: {error}") from None
-    return ToolModel(tool, mesh, body, _outward(body.triangles) if tool.contact == SMOOTH else None)
+    return ToolModel(tool, mesh, body, outward_triangles(body.triangles) if tool.contact == SMOOTH else None)
 
 
-def _outward(triangles: np.ndarray) -> np.ndarray:
+def outward_triangles(triangles: np.ndarray) -> np.ndarray:
     """Triangles turned so that all look out of the solid; those of badly damaged meshes that have it on no side look both ways.
 
     A grain just outside a triangle that looks the wrong way would be taken for one that is deep inside the tool.

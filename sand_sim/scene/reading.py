@@ -31,6 +31,9 @@ from sand_sim.scene.types import (
     Waypoint,
 )
 
+_TOOL_FIELDS = ("mesh", "material", "particle_radius", "particle_spacing", "contact", "scale", "thickness", "pose", "max_speed")
+_TOOL_FIELDS += ("trajectory",)
+
 
 def load_scene(path: str | Path) -> Scene:
     """Read and check a scene file.
@@ -182,10 +185,7 @@ def _fill(entry: Field, folder: Path) -> Fill:
 
 
 def _tool(name: str, entry: Field) -> Tool:
-    entry.keys(
-        ("mesh", "material", "particle_radius", "particle_spacing", "contact", "scale", "pose", "max_speed", "trajectory"),
-        required=("mesh", "material", "particle_radius"),
-    )
+    entry.keys(_TOOL_FIELDS, required=("mesh", "material", "particle_radius"))
     if not name.isidentifier():
         raise entry.refuse("a tool's name becomes part of its topics: letters, digits and underscores only")
     track = []
@@ -205,6 +205,7 @@ def _tool(name: str, entry: Field) -> Tool:
         particle_spacing=entry.optional("particle_spacing", lambda f: f.number(above=0.0, unit="m"), None),
         contact=entry.optional("contact", lambda f: f.choice((ROUGH, SMOOTH)), Tool.contact),
         scale=entry.optional("scale", lambda f: f.number(above=0.0), 1.0),
+        thickness=entry.optional("thickness", lambda f: f.number(above=0.0, unit="m"), None),
         pose=entry.optional("pose", read_pose, initial),
         max_speed=entry.optional("max_speed", lambda f: f.number(above=0.0, most=1e4, unit="m/s"), 2.0),
         trajectory=tuple(track),

@@ -161,6 +161,7 @@ class Body:
     mesh: str | None = None
     particle_radius: float = 0.0  # [m] of the particles that make the mesh's skin
     scale: float = 1.0
+    thickness: float | None = None  # [m] of sheets modelled as surfaces; None: two particle radii
     spheres: Path | tuple[tuple[float, ...], ...] | None = None  # x y z radius [m]
     pose: Pose = field(default_factory=Pose)
     velocity: Vector = (0.0, 0.0, 0.0)  # [m/s] of the centre of mass
@@ -180,6 +181,7 @@ class Tool:
     particle_spacing: float | None = None  # [m]; None: chosen from radius and grains
     contact: str = ROUGH  # or SMOOTH
     scale: float = 1.0  # [m per mesh unit]
+    thickness: float | None = None  # [m] of sheets modelled as surfaces; None: two particle radii
     pose: Pose = Pose()
     max_speed: float = 2.0  # [m/s] of any point of the tool; faster commands are rejected
     trajectory: tuple[Waypoint, ...] = ()

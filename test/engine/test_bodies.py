@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from scenes import RIGID, floor
 
-from sand_sim import World, read_scene, rotation
+from sand_sim import SceneError, World, read_scene, rotation
 
 MATERIALS = {
     "stone": {"density": 2500.0, "young": 1e7, "poisson": 0.25},
@@ -253,3 +253,17 @@ def test_light_body_gets_a_small_enough_step(make_bodies):
         assert world.observe().body("ball").velocity[2] == pytest.approx(0.5, rel=5e-3)
         steps.append(world.time_step)
     assert steps[1] / steps[0] == pytest.approx((1e-6 / 1.3e-3) ** 0.4, rel=0.05)  # as the contact time
+
+
+def test_sheet_weighs_what_its_thickness_says(make_bodies, tmp_path):
+    """A plate modelled as a surface of 0.1 x 0.06 m^2; sampled once, then taken from the cache."""
+    corners = [[-0.05, -0.03, 0.0], [0.05, -0.03, 0.0], [0.05, 0.03, 0.0], [-0.05, 0.03, 0.0]]
+    trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]]).export(tmp_path / "sheet.stl")
+    body = {"mesh": str(tmp_path / "sheet.stl"), "particle_radius": 0.002}
+    for thickness, expected in ((0.003, 0.003), (None, 0.004)):
+        extra = {} if thickness is None else {"thickness": thickness}
+        made = [make_bodies({"sheet": body | extra}).assembly.bodies[0] for _ in range(2)]
+        assert made[0].mass == pytest.approx(MATERIALS["stone"]["density"] * 0.1 * 0.06 * expected, rel=1e-6)
+        assert np.array_equal(made[0].shape.centres, made[1].shape.centres)
+    with pytest.raises(SceneError, match="thickness"):
+        make_bodies({"sheet": body | {"thickness": 0.0}})

@@ -256,3 +256,16 @@ def test_saved_state_goes_on_to_the_bit_on_any_number_of_threads(make_smooth_wor
     found = other.save()
     differ = {name for name in expected if expected[name].tobytes() != found[name].tobytes()}
     assert differ <= {"tools.impulse", "start", "observed_steps", "observed_wrench"}  # since the last observation
+
+
+def test_a_sheet_is_as_thick_as_asked(make_smooth_world):
+    """A plate modelled as a surface without thickness, 3 mm thick, carries a grain 1.5 mm above that surface."""
+    sheet = trimesh.Trimesh(
+        [[-0.05, -0.03, 0.0], [0.05, -0.03, 0.0], [0.05, 0.03, 0.0], [-0.05, 0.03, 0.0]], [[0, 1, 2], [0, 2, 3]]
+    )
+    world = make_smooth_world([[0.001, 0.002, RADIUS + 0.0016]], sheet, {"thickness": 0.003}, gravity=[0.0, 0.0, -GRAVITY])
+    world.step(round(0.3 / world.time_step))
+    observation = world.observe()
+    expected = 0.0015 + RADIUS - resting_overlap(MASS * GRAVITY)
+    assert observation.grains.position[0, 2] == pytest.approx(expected, abs=1e-8)
+    assert observation.tool("tool").force == pytest.approx([0.0, 0.0, -MASS * GRAVITY], abs=1e-4 * MASS * GRAVITY)
