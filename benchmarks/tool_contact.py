@@ -1,8 +1,8 @@
 """What it changes that grains touch a tool's true surface and not its particles: normals, digging forces, carried mass, time.
 
 First how far the normals of a grain's contacts with the particles of each mesh lean from the true surface, as a grain comes down
-on it from everywhere; then the digging scene with a rough bucket, one of finer particles and a smooth one, in turn, frame by
-frame, so that a busy machine slows all of them alike. Prints JSON lines. Run from the root of the source tree:
+on it from everywhere; then the time of a step with the bucket at rest in the bed; then the digging scene with a rough bucket, one
+of finer particles and a smooth one, in turn, frame by frame, so that a busy machine slows all of them alike. Prints JSON lines. Run from the root of the source tree:
 ``python -m benchmarks.tool_contact [MESH ...]``.
 """
 
@@ -23,10 +23,12 @@ from sand_sim import World
 from sand_sim.config_folder import find_scene
 from sand_sim.playing import commands_at, frame_times
 from sand_sim.scene.reading import load_scene
+from sand_sim.scene.types import Settle
 from sand_sim.sinks.run_log import RunLog
 from sand_sim.track import phases_of
 
 PLACES = 4000
+STEPS, ROUNDS = 200, 25
 GRAIN, PARTICLE = 0.0066, 0.004  # [m] mean grain and particles of the digging scene
 CASES = {"rough": {}, "rough, half the particle radius": {"particle_radius": 0.002}, "smooth": {"contact": "smooth"}}
 
@@ -53,6 +55,29 @@ def leaning_normals(body: ParticleBody, grain: float) -> np.ndarray:
             if np.linalg.norm(nearest[0] - place) < 1e-4 * grain:
                 angles.append(np.arccos(min(1.0, (centre - body.points[first]) @ normal / reach)))
     return np.array(angles)
+
+
+def time_steps(threads: int) -> dict[str, dict]:
+    """Time of a step with each bucket where it is in the middle of the cut, at rest; the worlds step in turn."""
+    scene = load_scene(find_scene("dig"))
+    pose, solver = scene.tools[0].trajectory[3].pose, replace(scene.solver, threads=threads)
+    scene = replace(scene, settle=Settle(time=0.2), solver=solver)
+    tools = {name: replace(scene.tools[0], pose=pose, trajectory=(), **fields) for name, fields in CASES.items()}
+    worlds, spent = {name: World(replace(scene, tools=(tool,))) for name, tool in tools.items()}, {name: [] for name in CASES}
+    for _ in range(ROUNDS):
+        for name, world in worlds.items():
+            begin = time.perf_counter()
+            world.step(STEPS)
+            spent[name].append(1e6 * (time.perf_counter() - begin) / STEPS)
+    rows = {}
+    for name, world in worlds.items():
+        arrays = world.assembly.solver.arrays
+        contacts = arrays.tool_list
+        number = contacts.pairs.get()
+        near = len(np.unique(contacts.owner.numpy()[:number]))
+        rows[name] = {"least_us_per_step": min(spent[name]), "median_us_per_step": float(np.median(spent[name]))}
+        rows[name] |= {"grains_near_the_tool": near, "contacts_with_the_tool": len(world.tool_contacts("bucket"))}
+    return rows
 
 
 def dig(seed: int, threads: int) -> dict[str, dict]:
@@ -97,7 +122,7 @@ def main() -> None:
     """Run all."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("meshes", nargs="*", type=Path, help="more meshes to measure normals on; ending in _mm: in millimetres")
-    parser.add_argument("--seeds", type=int, default=3, help="beds to dig in (default: 3; 0: normals only)")
+    parser.add_argument("--seeds", type=int, default=3, help="beds to dig in (default: 3)")
     parser.add_argument("--threads", type=int, default=1, help="cores (default: 1)")
     options = parser.parse_args()
     bucket = find_scene("dig").parent / "meshes" / "bucket.stl"
@@ -108,10 +133,16 @@ def main() -> None:
         row |= {"largest_degrees": round(float(angles.max()), 2), "rms_degrees": round(float(np.sqrt(np.mean(angles**2))), 2)}
         row |= {"bound_degrees": round(float(np.degrees(body.roughness(GRAIN))), 2)}
         print(json.dumps(row | provenance(options.threads)), flush=True)
+    show({"pose": "in the cut, at rest"}, time_steps(options.threads), options.threads)
     for seed in range(1, options.seeds + 1):
-        for name, row in dig(seed, options.threads).items():
-            rounded = {key: float(f"{value:.4g}") if isinstance(value, float) else value for key, value in row.items()}
-            print(json.dumps({"benchmark": "tool_contact", "seed": seed, "case": name} | rounded | provenance(options.threads)))
+        show({"seed": seed}, dig(seed, options.threads), options.threads)
+
+
+def show(which: dict, rows: dict[str, dict], threads: int) -> None:
+    """Print a JSON line for each case."""
+    for name, row in rows.items():
+        rounded = {key: float(f"{value:.4g}") if isinstance(value, float) else value for key, value in row.items()}
+        print(json.dumps({"benchmark": "tool_contact"} | which | {"case": name} | rounded | provenance(threads)), flush=True)
 
 
 if __name__ == "__main__":

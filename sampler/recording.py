@@ -10,7 +10,7 @@ from sampler.distance import SignedDistance
 from sampler.errors import MeshError
 
 _EVERY = 3  # moves of the particles between two pictures
-_SLICE = 120  # nodes along the longest edge of a slice
+_SLICE = 200  # nodes along the longest edge of a slice
 _FREE, _SOLID = np.array([70, 130, 200]), np.array([210, 110, 60])
 
 
@@ -29,6 +29,7 @@ class Recording:
     def __init__(self, path: Path, mesh: trimesh.Trimesh, radius: float):
         try:
             import rerun as rr
+            import rerun.blueprint as rrb
         except ImportError:
             raise MeshError("--rrd needs Rerun: pip install 'rerun-sdk'") from None
         try:
@@ -38,8 +39,12 @@ class Recording:
             raise MeshError(f"recording {path}: cannot be written: {error.strerror}") from None
         self._rr, self._radius, self._moves = rr, radius, 0
         self._stream = rr.RecordingStream("sampler")
-        self._stream.save(path)
-        self._log("mesh", self._mesh(np.asarray(mesh.triangles), [150, 150, 150, 90]), static=True)
+        views = [
+            rrb.Spatial3DView(name="particles", contents=["/solid", "/particles", "/normals"]),
+            rrb.Spatial3DView(name="signed distance", contents=["/mesh", "/field/**"]),
+        ]
+        self._stream.save(path, rrb.Blueprint(rrb.Horizontal(*views), collapse_panels=True))
+        self._log("mesh", self._mesh(np.asarray(mesh.triangles), [150, 150, 150, 60]), static=True)
 
     def particles(self, points: np.ndarray) -> None:
         """Add the particles, shape (n, 3) [m], after one more move."""
@@ -50,8 +55,8 @@ class Recording:
     def finish(self, body: ParticleBody, distance: SignedDistance) -> None:
         """Add the finished body and three slices of the distance, and close the file."""
         self._show(body.points, [60, 160, 90])
-        arrows = self._rr.Arrows3D(origins=body.points, vectors=1.5 * body.radius * body.normals, radii=0.08 * body.radius)
-        self._log("normals", arrows, static=True)
+        arrows = self._rr.Arrows3D(origins=body.points, vectors=1.5 * body.radius * body.normals, radii=0.04 * body.radius)
+        self._log("normals", arrows)
         self._log("solid", self._mesh(body.triangles, [200, 200, 205, 255]), static=True)
         for axis, name in enumerate("xyz"):
             self._log(f"field/{name}", self._slice(distance, axis), static=True)
