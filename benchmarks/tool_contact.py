@@ -2,7 +2,8 @@
 
 First how far the normals of a grain's contacts with the particles of each mesh lean from the true surface, as a grain comes down
 on it from everywhere; then the time of a step with the bucket at rest in the bed; then the digging scene with a rough bucket, one
-of finer particles and a smooth one, in turn, frame by frame, so that a busy machine slows all of them alike. Prints JSON lines. Run from the root of the source tree:
+of finer particles and a smooth one, in turn, frame by frame, so that a busy machine slows all of them alike. Prints JSON lines.
+Run from the root of the source tree:
 ``python -m benchmarks.tool_contact [MESH ...]``.
 """
 
