@@ -23,13 +23,13 @@ from sand_sim.observing import (
     observe_walls,
     start_energy,
 )
-from sand_sim.scene.types import Scene, SceneError
+from sand_sim.scene.types import Scene
+from sand_sim.settling import settle, strike_off
 from sand_sim.sweeping import SweptGround
 from sand_sim.tool_model import Progress, ToolModel
 from sand_sim.track import Track
 from sand_sim.trust import BLOWN_UP, GAINED, gained_share
 
-_SETTLE_CHUNKS = 50
 _SPEED_TOLERANCE = 1.02
 _FEWEST_BETWEEN = 100  # steps between two states that are kept, so that keeping them stays below 3 % of the time
 
@@ -54,8 +54,8 @@ class World:
         self._set_tracks([Track.rest(tool.pose) for tool in scene.tools])
         self._solver.renew_lists()
         self._beforehand = find_overlap(self.assembly) + find_fine_tools(self.assembly) + find_coarseness(self.assembly)
-        self._settle(progress)
-        self._strike_off()
+        settle(self.assembly, self._beforehand, progress)
+        strike_off(self.assembly)
         self._solver.begin()
         self._solver.engage_plungers()
         self._start = start_energy(self.assembly)
@@ -278,33 +278,3 @@ class World:
             structs.append(one)
         if structs:
             self._solver.arrays.tools.set_tracks(structs)
-
-    def _settle(self, progress: Progress) -> None:
-        settle = self.scene.settle
-        if settle.time <= 0.0:
-            return
-        chunk = max(1, round(settle.time / _SETTLE_CHUNKS / self.time_step))
-        for done in range(_SETTLE_CHUNKS):
-            try:
-                self._solver.run(chunk)
-            except UnstableError as error:
-                why = "; ".join(self._beforehand) or f"try a smaller time step than {self.time_step:.2g} s"
-                raise SceneError(f"settle: the bed blows up while it settles: {error}; {why}") from None
-            self._solver.measure()
-            cloud = observe_grains(self.assembly)
-            speed = np.sqrt(np.sum(cloud.mass * cloud.speed**2) / np.sum(cloud.mass))
-            progress("settling", (done + 1) / _SETTLE_CHUNKS)
-            if speed < settle.speed:
-                progress("settling", 1.0)
-                break
-
-    def _strike_off(self) -> None:
-        """Take away what lies above the asked height of a fill."""
-        cloud, first = observe_grains(self.assembly), 0
-        for fill, number in zip(self.scene.fills, self.assembly.fill_numbers, strict=True):
-            if fill.height is not None:
-                own = (cloud.identity >= first) & (cloud.identity < first + number)
-                above = cloud.position[:, 2] + cloud.radius > fill.low[2] + fill.height
-                gone = cloud.identity[own & above]
-                self._solver.remove(np.flatnonzero(np.isin(self.assembly.table.grain, gone)))
-            first += number
