@@ -24,6 +24,11 @@ class ToolModel:
     body: ParticleBody
 
     @property
+    def margin(self) -> float:
+        """How far its surface lies outside the mesh [m]."""
+        return self.body.radius
+
+    @property
     def extent(self) -> float:
         """Farthest particle surface from the tool frame's origin [m]."""
         return float(np.linalg.norm(self.body.points, axis=1).max() + self.body.radius)

@@ -1,0 +1,115 @@
+"""From a running world to one with more grains or another tool: everything else goes on where it was, to the bit."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from sand_sim.assemble import Assembly, build_solver
+from sand_sim.grain_table import GrainTable
+from sand_sim.integrator import VERLET
+from sand_sim.tool_model import ToolModel, model_tool
+
+_ADDED = ("radius", "density", "material")  # columns of a table that a state cannot tell
+
+
+def rebuild(assembly: Assembly, table: GrainTable, tools: list[ToolModel]) -> Assembly:
+    """The same world with other grains or tools, on the same device; its state is that of the start."""
+    bare, old = replace(assembly, table=table, tools=tools), assembly.solver
+    return replace(bare, solver=build_solver(bare, old.arrays.setting, old.device))
+
+
+def carry_over(old: Assembly, new: Assembly, replaced: int | None = None) -> None:
+    """Put the state of one world into another that has more grains at the end of its table, or another tool.
+
+    Places, velocities and all that contacts remember stay as they are; only what the grains have felt of a replaced tool is
+    forgotten. New grains begin as the table has them.
+
+    Args:
+        old: measured, so that its contact lists are up to date.
+        new: from ``rebuild``.
+        replaced: number of the tool that is another one now.
+    """
+    state, fresh = old.solver.take_state(), new.solver.take_state()
+    grains, room = int(state["grains.number"]), len(state["grains.place"])
+    added = len(fresh["grains.place"]) - room
+    for name, rows in state.items():
+        if name.endswith(".starts"):  # those who come behind the last grain have had no contacts
+            state[name] = np.concatenate([rows[: grains + 1], np.full(added, rows[grains], rows.dtype), rows[grains + 1 :]])
+        elif name.startswith("grains.") and name != "grains.number":
+            state[name] = np.concatenate([rows[:grains], fresh[name][room:], rows[grains:]])
+    newcomers = slice(grains, grains + added)
+    state["grains.number"] = np.array(grains + added)
+    state["grains.came_from"][newcomers] = np.arange(grains, grains + added)
+    if old.recipe.integrator == VERLET and not state["flags.starting"][0]:
+        half_step = 0.5 * old.time_step.value * np.asarray(old.scene.gravity)
+        state["grains.half_motion"][newcomers] -= half_step.astype(state["grains.half_motion"].dtype)
+    if "tool.partner" in state:
+        numbers = _particle_numbers(old.solver.arrays.tools, new.solver.arrays.tools, replaced)
+        state["tool.partner"] = numbers[state["tool.partner"]]
+    new.solver.put_state(state)
+    new.solver.expect_moves()
+
+
+def describe_changes(assembly: Assembly, loaded: GrainTable) -> dict[str, np.ndarray]:
+    """What has been changed in a world since it was loaded with this table, as plain arrays that belong to its state."""
+    added = {f"added.{name}": getattr(assembly.table, name)[len(loaded) :] for name in _ADDED}
+    tools = [model.tool for model in assembly.tools]
+    scales = np.array([tool.scale for tool in tools], float)
+    return added | {"mesh.path": np.array([tool.mesh for tool in tools], str), "mesh.scale": scales}
+
+
+def fit(assembly: Assembly, loaded: GrainTable, models: dict, state: dict[str, np.ndarray]) -> Assembly:
+    """A world that a state fits into: the one there is, or one with the grains and tools that the state speaks of.
+
+    Args:
+        assembly: the world's.
+        loaded: its table as the scene made it.
+        models: tools known, by number, mesh and scale; completed here.
+        state: from ``World.save``.
+
+    Raises:
+        ValueError: if the state is of another scene.
+        SceneError: if a mesh that it asks for can no longer be used.
+    """
+    table, tools = assembly.table, list(assembly.tools)
+    wanted = [state.get(f"added.{name}", np.zeros(0)) for name in _ADDED]
+    if not all(np.array_equal(getattr(table, name)[len(loaded) :], rows) for name, rows in zip(_ADDED, wanted, strict=True)):
+        radius, density, material = wanted
+        middle, still = np.tile(assembly.lattice.centre, (len(radius), 1)), np.zeros((len(radius), 3))
+        rows = GrainTable.of_spheres(middle, still, still.copy(), radius, density, material.astype(int))
+        table = GrainTable.join([loaded, rows])
+    if len(state["grains.place"]) != len(table) or len(state.get("mesh.path", tools)) != len(tools):
+        raise ValueError(
+            f"state: is of another scene: it has {len(state['grains.place'])} spheres and {len(state.get('mesh.path', tools))} "
+            f"tools, this scene {len(loaded)} spheres, {len(table) - len(loaded)} added later, and {len(tools)} tools"
+        )
+    for index, (path, scale) in enumerate(zip(state.get("mesh.path", ()), state.get("mesh.scale", ()), strict=True)):
+        key = (index, str(path), float(scale))
+        if key != (index, tools[index].tool.mesh, tools[index].tool.scale):
+            if key not in models:
+                models[key] = model_tool(replace(tools[index].tool, mesh=key[1], scale=key[2]), assembly.scene, _silent)
+            tools[index] = models[key]
+    same = table is assembly.table and all(one is other for one, other in zip(tools, assembly.tools, strict=True))
+    return assembly if same else rebuild(assembly, table, tools)
+
+
+def _silent(stage: str, share: float) -> None:
+    """Nobody watches the progress."""
+
+
+def _particle_numbers(old, new, replaced: int | None) -> np.ndarray:
+    """New number of each old tool particle, shape (particles,), -1 for those of a replaced tool.
+
+    Particles are numbered by cells, whose width depends on the largest grain.
+    """
+    numbers = np.full(old.particles.shape[0], -1, np.int32)
+    of_old, of_new = old.tool_of.numpy(), new.tool_of.numpy()
+    for tool in range(old.number):
+        if tool != replaced:
+            was, is_now = np.flatnonzero(of_old == tool), np.flatnonzero(of_new == tool)
+            numbers[was[_by_place(old.particles.numpy()[was])]] = is_now[_by_place(new.particles.numpy()[is_now])]
+    return numbers
+
+
+def _by_place(points: np.ndarray) -> np.ndarray:
+    return np.lexsort(points.T)

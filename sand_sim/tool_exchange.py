@@ -1,0 +1,68 @@
+"""Another body for a tool while its world runs: what it must keep to."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from sand_sim.assemble import Assembly
+from sand_sim.border import CommandError, GrainCloud
+from sand_sim.clearance import as_at_start
+from sand_sim.scene.types import SceneError, Tool
+from sand_sim.tool_model import ToolModel, model_tool
+
+
+def read_tool(assembly: Assembly, tool: Tool, mesh: str, scale: float) -> ToolModel:
+    """Sample another mesh for a tool, as the scene would.
+
+    Raises:
+        CommandError: if mesh or scale cannot be used.
+    """
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise CommandError("bad_mesh", f"tool '{tool.name}': scale must be positive, not {scale}")
+    try:
+        return model_tool(replace(tool, mesh=str(mesh), scale=float(scale)), assembly.scene, lambda stage, share: None)
+    except SceneError as error:
+        raise CommandError("bad_mesh", str(error)) from None
+
+
+def check_tool(assembly: Assembly, tools: list[ToolModel], index: int, pose: tuple, spheres: GrainCloud, overlap: float) -> None:
+    """See that a tool can take the place of another.
+
+    Args:
+        assembly: the world's.
+        tools: all of them, with the new one.
+        index: which of them is new.
+        pose: position [m] and orientation of the tool now.
+        spheres: from ``observe_spheres``.
+        overlap: share of a grain's radius that it may cut into [1].
+
+    Raises:
+        CommandError: if it overlaps grains by more, asks for a smaller time step, or is too large for the domain's margin.
+    """
+    model, lattice, step = tools[index], assembly.lattice, assembly.time_step
+    name = f"tool '{model.tool.name}'"
+    room = lattice.quantum * lattice.end - 0.5 * float(np.max(lattice.high - lattice.low))
+    if model.extent > room:
+        raise CommandError(
+            "too_large",
+            f"{name}: the new mesh reaches {model.extent:.4g} m from the tool frame's origin, the domain's margin is made "
+            f"for {room:.4g} m; load the scene with it, or scale it down",
+        )
+    safe = replace(assembly, tools=tools).safe_step(0.0, 0.0)
+    if step.value > 1.0001 * safe and safe < 0.9999 * assembly.safe_step(0.0, 0.0):
+        raise CommandError(
+            "too_fine",
+            f"{name}: the new mesh has particles {model.body.spacing:.3g} m apart, which ask for a time step of {safe:.3g} s; "
+            f"it is {step.value:.3g} s. Load the scene with it",
+        )
+    radius = spheres.radius.astype(float)
+    near = np.flatnonzero(np.linalg.norm(spheres.position - pose[0], axis=1) < model.extent + radius)
+    share = 1.0 - model.distance(as_at_start(spheres.position[near], model.tool.pose, pose)) / radius[near]
+    deep = share > overlap
+    if deep.any():
+        place = spheres.position[near[np.argmax(share)]].round(4).tolist()
+        raise CommandError(
+            "blocked",
+            f"{name}: the new mesh overlaps {deep.sum()} grains by more than {overlap:g} of a radius, the deepest at {place} m "
+            f"by {share.max():.2g}; move the tool away first",
+        )
