@@ -8,9 +8,9 @@ from sand_sim.assemble import Assembly
 from sand_sim.beforehand import find_coarseness, find_fine_tools
 from sand_sim.border import Health
 from sand_sim.carrying_over import carry_over, rebuild
-from sand_sim.exchange import admit, check_room, dismiss, find_grains, read_grains
+from sand_sim.exchange import check_room, find_grains, read_grains
 from sand_sim.grain_table import GrainTable
-from sand_sim.observing import StartEnergy, observe_grains, observe_spheres
+from sand_sim.observing import balance_rounding, observe_grains, observe_spheres
 from sand_sim.scene.stable_step import DEEP
 from sand_sim.tool_exchange import check_tool, read_tool
 
@@ -38,8 +38,9 @@ class Changeable:
         check_room(self.assembly, observe_spheres(self.assembly), self._poses, rows)
         table = self.assembly.table
         if len(rows):
-            start = admit(self._start, self.assembly, rows)
-            self._go_on_with(rebuild(self.assembly, GrainTable.join([table, rows]), self.tools), start)
+            longer = rebuild(self.assembly, GrainTable.join([table, rows]), self.tools)
+            carry_over(self.assembly, longer)
+            self._go_on_with(longer)
         return np.arange(table.grains, table.grains + len(rows))
 
     def remove_grains(self, identity=None, box=None) -> np.ndarray:
@@ -59,9 +60,8 @@ class Changeable:
         self._health()
         cloud = observe_grains(self.assembly)
         gone = find_grains(self.assembly, cloud, identity, box)
-        start = dismiss(self._start, self.assembly, cloud, gone)
         self._solver.remove(np.flatnonzero(np.isin(self.assembly.grain_of_sphere, gone)))
-        self._go_on_with(self.assembly, start)
+        self._go_on_with(self.assembly)
         return gone
 
     def set_tool_mesh(self, tool: str, mesh: str, scale: float = 1.0, overlap: float = DEEP) -> None:
@@ -71,35 +71,40 @@ class Changeable:
             tool: name.
             mesh: file, or address as in a scene.
             scale: [m per mesh unit].
-            overlap: share of a grain's radius that the new body may cut into at most [1].
+            overlap: share of a grain's radius by which the new body may cut deeper into it than the present one [1].
 
         Raises:
-            CommandError: if the mesh cannot be used, or overlaps grains by more; nothing is changed then.
+            CommandError: if the mesh cannot be used, or cuts deeper into grains; nothing is changed then.
         """
-        index, before = self._index_of(tool), self._health()
+        index = self._index_of(tool)
+        self._health()
         model = read_tool(self.assembly, self.tools[index].tool, mesh, scale)
         tools = [*self.tools[:index], model, *self.tools[index + 1 :]]
         check_tool(self.assembly, tools, index, self._poses[index], observe_spheres(self.assembly), overlap)
         self._sweep()
         self._models[index, model.tool.mesh, model.tool.scale] = model
-        self._go_on_with(rebuild(self.assembly, self.assembly.table, tools), self._start, replaced=index)
-        # What is stored in its contacts now has been brought by the exchange, not by motion.
-        self._start = replace(self._start, total=self._start.total + self._health().elastic - before.elastic)
-        self._measured = None
-        self._keep_anyway()
+        other = rebuild(self.assembly, self.assembly.table, tools)
+        carry_over(self.assembly, other, replaced=index)
+        self._go_on_with(other)
 
-    def _go_on_with(self, assembly: Assembly, start: StartEnergy, replaced: int | None = None) -> None:
-        """Go on from here with other grains or tools."""
-        if assembly is not self.assembly:
-            carry_over(self.assembly, assembly, replaced)
-        self.assembly, self._start = assembly, start
+    def _go_on_with(self, assembly: Assembly) -> None:
+        """Go on with other grains or tools, after a moment in which no time has passed.
+
+        So all energy that is there now and was not before has come with them, and what is missing has gone with them.
+        """
+        was, start = self._health(), replace(self._start)
+        self.assembly = assembly
         self._look_anew()
-        self._keep_anyway()
+        now = self._health()
+        start.total += was.dissipated - now.dissipated
+        start.height += now.potential - was.potential
+        start.grains += was.retired - now.retired
+        start.rounding = max(start.rounding, balance_rounding(assembly))
+        self._start, self._measured = start, None
+        self._good_health, self._good, self._kept_steps = self._health(), self.save(), self._solver.steps_done
 
     def _look_anew(self) -> None:
+        """Forget what has been found out about other grains or tools."""
         self._swept.set_tools(self.tools)
         self._beforehand = self._overlap + find_fine_tools(self.assembly) + find_coarseness(self.assembly)
         self._measured: tuple[int, Health] | None = None
-
-    def _keep_anyway(self) -> None:
-        self._good_health, self._good, self._kept_steps = self._health(), self.save(), self._solver.steps_done

@@ -1,6 +1,4 @@
-"""Grains that are put into a running world and taken out of it, and the energy that comes and goes with them."""
-
-from dataclasses import replace
+"""Grains that are to be put into a running world or taken out of it: what they must keep to."""
 
 import numpy as np
 
@@ -9,7 +7,6 @@ from sand_sim.border import CommandError, GrainCloud
 from sand_sim.clearance import find_obstacles
 from sand_sim.cloud_selection import in_box
 from sand_sim.grain_table import GrainTable
-from sand_sim.observing import StartEnergy
 
 _FASTEST = 0.5  # radii in a step, beyond which a grain would be taken for a blown-up run
 
@@ -100,63 +97,6 @@ def find_grains(assembly: Assembly, cloud: GrainCloud, identity, box) -> np.ndar
         some = ", ".join(str(one) for one in unknown[:5]) + (", ..." if len(unknown) > 5 else "")
         raise CommandError("unknown_grain", f"{len(unknown)} of {len(asked)} grains are not in the domain: {some}")
     return asked
-
-
-def admit(start: StartEnergy, assembly: Assembly, rows: GrainTable) -> StartEnergy:
-    """The balance of energy with that of new grains, as if they had been there from the start."""
-    kinetic = 0.5 * np.sum(rows.mass * np.sum(rows.velocity**2, axis=1))
-    return _shifted(start, assembly, len(rows), kinetic, rows.mass, rows.position)
-
-
-def dismiss(start: StartEnergy, assembly: Assembly, cloud: GrainCloud, gone: np.ndarray) -> StartEnergy:
-    """The balance of energy without some grains, shape (n,) identities, and what is stored in their contacts.
-
-    The solver must have been measured just before.
-    """
-    rows = np.flatnonzero(np.isin(cloud.identity, gone))
-    mass, turning = cloud.mass[rows].astype(float), cloud.spin[rows].astype(float)
-    inertia = np.repeat((0.4 * mass * cloud.radius[rows].astype(float) ** 2)[:, None], 3, axis=1)
-    bodies = np.flatnonzero(~assembly.lone_grain[cloud.identity[rows]])
-    if len(bodies):
-        of_body = np.searchsorted(assembly.grain_of_body, cloud.identity[rows[bodies]])
-        inertia[bodies] = assembly.table.bodies.inertia[of_body]
-        turning[bodies] = _in_own_frame(cloud.orientation[rows[bodies]], turning[bodies])
-    kinetic = 0.5 * np.sum(mass * np.sum(cloud.velocity[rows].astype(float) ** 2, axis=1)) + 0.5 * np.sum(inertia * turning**2)
-    stored = _stored(assembly, np.isin(assembly.grain_of_sphere, gone))
-    return _shifted(start, assembly, -len(rows), -kinetic - stored, -mass, cloud.position[rows])
-
-
-def _shifted(start: StartEnergy, assembly: Assembly, grains: int, energy: float, mass, position) -> StartEnergy:
-    gravity, lattice = np.asarray(assembly.scene.gravity), assembly.lattice
-    height = -float(np.sum(mass * ((position - lattice.centre) @ gravity)))
-    weight = float(np.sum(mass)) * np.linalg.norm(gravity)
-    span = np.linalg.norm(lattice.high - lattice.low)
-    return replace(
-        start,
-        total=float(start.total + energy + height),
-        height=start.height + height,
-        rounding=start.rounding + float(assembly.recipe.precision.epsilon * max(weight, 0.0) * 0.5 * span),
-        grains=start.grains + grains,
-    )
-
-
-def _stored(assembly: Assembly, gone: np.ndarray) -> float:
-    """Energy in all contacts of some spheres of the table, shape (spheres,) bool [J]."""
-    arrays, total = assembly.solver.arrays, 0.0
-    leaving = gone[arrays.grains.identity.numpy()]
-    for name, contacts in arrays.lists.items():
-        number = contacts.pairs.get()
-        concerned = leaving[contacts.owner.numpy()[:number]]
-        if name == "pair":
-            concerned = concerned | leaving[contacts.partner.numpy()[:number]]
-        total += float(arrays.energy[name].numpy()[:number][concerned].sum(dtype=float))
-    return total
-
-
-def _in_own_frame(turn: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    axis, w = -turn[:, :3], turn[:, 3:]
-    twice = 2.0 * np.cross(axis, vectors)
-    return vectors + w * twice + np.cross(axis, twice)
 
 
 def _some(which: np.ndarray, position: np.ndarray) -> str:

@@ -34,10 +34,10 @@ def check_tool(assembly: Assembly, tools: list[ToolModel], index: int, pose: tup
         index: which of them is new.
         pose: position [m] and orientation of the tool now.
         spheres: from ``observe_spheres``.
-        overlap: share of a grain's radius that it may cut into [1].
+        overlap: share of a grain's radius by which it may cut deeper into it than the present one does [1].
 
     Raises:
-        CommandError: if it overlaps grains by more, asks for a smaller time step, or is too large for the domain's margin.
+        CommandError: if it cuts deeper, asks for a smaller time step, or is too large for the domain's margin.
     """
     model, lattice, step = tools[index], assembly.lattice, assembly.time_step
     name = f"tool '{model.tool.name}'"
@@ -56,13 +56,16 @@ def check_tool(assembly: Assembly, tools: list[ToolModel], index: int, pose: tup
             f"it is {step.value:.3g} s. Load the scene with it",
         )
     radius = spheres.radius.astype(float)
-    near = np.flatnonzero(np.linalg.norm(spheres.position - pose[0], axis=1) < model.extent + radius)
-    share = 1.0 - model.distance(as_at_start(spheres.position[near], model.tool.pose, pose)) / radius[near]
-    deep = share > overlap
-    if deep.any():
-        place = spheres.position[near[np.argmax(share)]].round(4).tolist()
+    reach = max(model.extent, assembly.tools[index].extent)
+    near = np.flatnonzero(np.linalg.norm(spheres.position - pose[0], axis=1) < reach + radius)
+    there = as_at_start(spheres.position[near], model.tool.pose, pose)
+    was, now = (1.0 - one.distance(there) / radius[near] for one in (assembly.tools[index], model))
+    deeper = now - np.maximum(was, 0.0)
+    blocked = deeper > overlap
+    if blocked.any():
+        place = spheres.position[near[np.argmax(deeper)]].round(4).tolist()
         raise CommandError(
             "blocked",
-            f"{name}: the new mesh overlaps {deep.sum()} grains by more than {overlap:g} of a radius, the deepest at {place} m "
-            f"by {share.max():.2g}; move the tool away first",
+            f"{name}: the new mesh cuts into {blocked.sum()} grains by more than {overlap:g} of a radius, the deepest at {place} "
+            f"m by {deeper.max():.2g}; move the tool away first",
         )
