@@ -92,6 +92,8 @@ def find_grains(assembly: Assembly, cloud: GrainCloud, identity, box) -> np.ndar
         named = (cloud.identity >= first) & (cloud.identity < first + len(assembly.bodies))
         return cloud.identity[inside & ~named]
     asked = np.unique(np.asarray(identity).ravel())
+    if len(asked) and asked.dtype.kind not in "iu":
+        raise CommandError("shape", "remove_grains: identities must be whole numbers")
     unknown = asked[~np.isin(asked, cloud.identity)]
     if len(unknown):
         some = ", ".join(str(one) for one in unknown[:5]) + (", ..." if len(unknown) > 5 else "")

@@ -38,8 +38,8 @@ class StartEnergy:
 def start_energy(assembly: Assembly) -> StartEnergy:
     """The balance at time zero and what it may be wrong by.
 
-    A contact that begins in the middle of a step is wrong
-    by up to ``(v dt/(2 d_max))^2.5`` of the energy of an impact at the expected speed, 8e-4 for a step of 1/25 contact time.
+    A contact that begins in the middle of a step is wrong by up to ``(v dt/(2 d_max))^2.5`` of the energy of an impact at the
+    expected speed, 8e-4 for a step of 1/25 contact time.
     """
     sums, mass = assembly.solver.measure(), assembly.solver.arrays.grains.motion.numpy()[:, 3]
     return StartEnergy(

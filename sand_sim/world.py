@@ -247,8 +247,8 @@ class World(Changeable):
         self._solver.put_state(state)
         columns = [state[f"track.{name}"] for name in Track.__dataclass_fields__]
         self._tracks = [Track(*values) for values in zip(*columns, strict=True)]
-        self._swept.restore(state)
         self._look_anew()
+        self._swept.restore(state)
         self._start = StartEnergy(*(float(value) for value in state["start"]))
         self._observed_steps, self._observed_wrench = int(state["observed_steps"]), state.get("observed_wrench")
         self._good, self._good_health, self._kept_steps = state, self._health(), self._solver.steps_done
