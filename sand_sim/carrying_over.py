@@ -72,12 +72,9 @@ def fit(assembly: Assembly, loaded: GrainTable, models: dict, state: dict[str, n
         SceneError: if a mesh that it asks for can no longer be used.
     """
     table, tools = assembly.table, list(assembly.tools)
-    wanted = [state.get(f"added.{name}", np.zeros(0)) for name in _ADDED]
+    wanted = [np.asarray(state.get(f"added.{name}", np.zeros(0))) for name in _ADDED]
     if not all(np.array_equal(getattr(table, name)[len(loaded) :], rows) for name, rows in zip(_ADDED, wanted, strict=True)):
-        radius, density, material = wanted
-        middle, still = np.tile(assembly.lattice.centre, (len(radius), 1)), np.zeros((len(radius), 3))
-        rows = GrainTable.of_spheres(middle, still, still.copy(), radius, density, material.astype(int))
-        table = GrainTable.join([loaded, rows])
+        table = GrainTable.join([loaded, _added_rows(assembly, *wanted)])
     if len(state["grains.place"]) != len(table) or len(state.get("mesh.path", tools)) != len(tools):
         raise ValueError(
             f"state: is of another scene: it has {len(state['grains.place'])} spheres and {len(state.get('mesh.path', tools))} "
@@ -91,6 +88,35 @@ def fit(assembly: Assembly, loaded: GrainTable, models: dict, state: dict[str, n
             tools[index] = models[key]
     same = table is assembly.table and all(one is other for one, other in zip(tools, assembly.tools, strict=True))
     return assembly if same else rebuild(assembly, table, tools)
+
+
+def expect_layout(loaded: dict[str, np.ndarray], state: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Arrays as long as those of a state must be if it has the grains and tools that it says.
+
+    Args:
+        loaded: state of the world as it was loaded.
+        state: of any moment; only what ``describe_changes`` wrote is looked at.
+    """
+    added, like = len(state.get("added.radius", ())), dict(loaded)
+    for name, rows in loaded.items():
+        if name.startswith("added."):
+            like[name] = np.zeros(added, rows.dtype)
+        elif name.endswith(".starts") or (name.startswith("grains.") and rows.ndim):
+            like[name] = np.zeros((len(rows) + added, *rows.shape[1:]), rows.dtype)
+    paths = state.get("mesh.path", np.zeros(0))
+    if paths.dtype.kind == "U" and paths.shape == loaded["mesh.path"].shape:
+        like["mesh.path"] = paths  # as wide as its longest name
+    return like
+
+
+def _added_rows(assembly: Assembly, radius: np.ndarray, density: np.ndarray, material: np.ndarray) -> GrainTable:
+    """Grains whose places a state knows better."""
+    shapes = {rows.shape for rows in (radius, density, material)}
+    sound = len(shapes) == 1 and radius.ndim == 1 and np.isfinite(radius).all() and np.isfinite(density).all()
+    if not (sound and (radius > 0.0).all() and (density > 0.0).all() and np.isin(material, assembly.table.material).all()):
+        raise ValueError("state: what it says of added grains ('added.*') makes no sense")
+    middle, still = np.tile(assembly.lattice.centre, (len(radius), 1)), np.zeros((len(radius), 3))
+    return GrainTable.of_spheres(middle, still, still.copy(), radius, density, material.astype(int))
 
 
 def _silent(stage: str, share: float) -> None:

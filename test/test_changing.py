@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scenes import SceneMaker, floor, write_small_scene
 
-from sand_sim import CommandError, ToolPose, World, load_scene, read_scene
+from sand_sim import CommandError, ToolPose, UnstableError, World, load_scene, read_scene
+from sand_sim.carrying_over import expect_layout
 from sand_sim.clearance import overlapping
 
 NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
@@ -274,6 +275,41 @@ def test_state_of_another_scene_is_refused(tmp_path):
     with pytest.raises(ValueError, match="2 spheres and 0 tools, this scene 1 spheres, 0 added later"):
         other.restore(one.save())
     assert same_state(other.save(), before)
+
+
+def test_layout_of_a_state_is_told_by_what_was_added(tmp_path):
+    world = World(load_scene(write_small_scene(tmp_path)))
+    loaded = world.save()
+    world.add_grains(CLEAR, SMALL)
+    state = world.save()
+    like = expect_layout(loaded, state)
+    assert like.keys() == state.keys()
+    listed = ("owner", "partner", "memory", "order")
+    for name, rows in state.items():
+        assert rows.dtype == like[name].dtype, name
+        assert rows.shape == like[name].shape or name.split(".")[-1] in listed, name
+    for name, wrong in (("radius", -1.0), ("radius", np.nan), ("material", 7)):
+        with pytest.raises(ValueError, match="added"):
+            world.restore(state | {f"added.{name}": np.full(3, wrong)})
+    with pytest.raises(ValueError, match="added"):
+        world.restore(state | {"added.density": np.ones(2)})
+    assert same_state(world.save(), state)
+
+
+def test_blown_up_run_falls_back_to_the_moment_after(tmp_path, monkeypatch):
+    world = drawn(tmp_path)
+    world.add_grains(CLEAR, SMALL)
+    after = world.save()
+
+    def blow_up(steps):
+        raise UnstableError("gone")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(world.assembly.solver, "run", blow_up)
+        with pytest.raises(UnstableError, match="gone; kept is the state at"):
+            world.step(10)
+    assert same_state(world.save(), after)
+    world.step(10)
 
 
 def test_clumps_and_bodies_come_along(tmp_path):
