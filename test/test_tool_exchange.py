@@ -35,31 +35,36 @@ def test_same_shape_feels_the_same_grains(tmp_path):
     assert (report.work, report.swept, after.steps) == (was.work, was.swept, before.steps)
 
 
+def particles_of(world, tool):
+    tools = world.assembly.solver.arrays.tools
+    return tools.particles.numpy()[tools.tool_of.numpy() == tool].copy()
+
+
 def test_other_tools_go_on(tmp_path):
-    """A board pushed against the side of the bed keeps what its contacts remember when the plate, listed before it, changes."""
+    """A shield pushed against the side of the bed keeps what its contacts remember when the plate, listed before it, changes."""
     box(tmp_path, "plate.stl", (0.06, 0.06, 0.004))
     common = {"mesh": "plate.stl", "material": "steel", "particle_radius": 0.003, "max_speed": 1.0}
     start, upright = {"time": 0.0, "position": [0.015, 0.015, 0.06]}, {"rpy": [0.0, np.pi / 2, 0.0]}
     tools = {
         "plate": common | {"trajectory": [start]},
-        "board": common | {"trajectory": [{"time": 0.0, "position": [-0.02, 0.015, 0.03]} | upright]},
+        "shield": common | {"trajectory": [{"time": 0.0, "position": [-0.02, 0.015, 0.03]} | upright]},
     }
     world = drawn(tmp_path, tools=tools)
-    turn = world.observe().tool("board").orientation
-    world.apply(ToolPose("board", np.array([0.01, 0.015, 0.03]), turn, world.time + 0.06))
+    turn = world.observe().tool("shield").orientation
+    world.apply(ToolPose("shield", np.array([0.01, 0.015, 0.03]), turn, world.time + 0.06))
     world.step(round(0.05 / world.time_step))
     world.observe()
     kept = {key: value for key, value in memories(world).items() if key[0] == "tool"}
-    own = world.assembly.solver.arrays.tools.particles.numpy()[world.assembly.solver.arrays.tools.tool_of.numpy() == 1]
-    contacts = world.tool_contacts("board")
+    own = particles_of(world, 1)
+    contacts = world.tool_contacts("shield")
     assert len(contacts) >= 3
     world.set_tool_mesh("plate", box(tmp_path, "smaller.stl", (0.04, 0.04, 0.004)))
-    tools = world.assembly.solver.arrays.tools
-    assert np.array_equal(tools.particles.numpy()[tools.tool_of.numpy() == 1], own)
+    assert np.array_equal(particles_of(world, 1), own)
+    assert len(particles_of(world, 0)) != len(particles_of(world, 1))
     found = {key: value for key, value in memories(world).items() if key[0] == "tool"}
     assert len(kept) > len(found) > 0
     assert all(np.array_equal(found[key], kept[key]) for key in found)
-    assert world.tool_contacts("board").wrench == pytest.approx(contacts.wrench, rel=1e-5, abs=1e-7)
+    assert world.tool_contacts("shield").wrench == pytest.approx(contacts.wrench, rel=1e-5, abs=1e-7)
 
 
 def test_energy_of_the_exchange_is_accounted_for(tmp_path):
