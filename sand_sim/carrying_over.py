@@ -9,12 +9,24 @@ from sand_sim.grain_table import GrainTable
 from sand_sim.integrator import VERLET
 from sand_sim.tool_model import ToolModel, model_tool
 
+_SPARE = 1.05  # of a tool's reach
 _ADDED = ("radius", "density", "material")  # columns of a table that a state cannot tell
 
 
-def rebuild(assembly: Assembly, table: GrainTable, tools: list[ToolModel]) -> Assembly:
-    """The same world with other grains or tools, on the same device; its state is that of the start."""
-    bare, old = replace(assembly, table=table, tools=tools), assembly.solver
+def rebuild(assembly: Assembly, table: GrainTable, tools: list[ToolModel], reserve: float | None = None) -> Assembly:
+    """The same world with other grains or tools, on the same device; its state is that of the start.
+
+    Args:
+        assembly: the world's.
+        table: of its grains.
+        tools: of its tools.
+        reserve: room around the domain [m]; as it is, or made wider where a tool reaches farther, if None.
+    """
+    lattice, old = assembly.lattice, assembly.solver
+    if reserve is None:
+        farthest = max((tool.extent for tool in tools), default=0.0)
+        reserve = lattice.reserve if farthest <= lattice.room else _SPARE * farthest
+    bare = replace(assembly, table=table, tools=tools, lattice=replace(lattice, reserve=reserve))
     return replace(bare, solver=build_solver(bare, old.arrays.setting, old.device))
 
 
@@ -22,7 +34,7 @@ def carry_over(old: Assembly, new: Assembly, replaced: int | None = None) -> Non
     """Put the state of one world into another that has more grains at the end of its table, or another tool.
 
     Places, velocities and all that contacts remember stay as they are; only what the grains have felt of a replaced tool is
-    forgotten. New grains begin as the table has them.
+    forgotten. New grains begin as the table has them. Where the lattice has become wider, places are rounded anew.
 
     Args:
         old: measured, so that its contact lists are up to date.
@@ -37,6 +49,8 @@ def carry_over(old: Assembly, new: Assembly, replaced: int | None = None) -> Non
             state[name] = np.concatenate([rows[: grains + 1], np.full(added, rows[grains], rows.dtype), rows[grains + 1 :]])
         elif name.startswith("grains.") and name != "grains.number":
             state[name] = np.concatenate([rows[:grains], fresh[name][room:], rows[grains:]])
+    if new.lattice.quantum != old.lattice.quantum:
+        _rescale(state, old.lattice.quantum / new.lattice.quantum, grains)
     newcomers = slice(grains, grains + added)
     state["grains.number"] = np.array(grains + added)
     state["grains.came_from"][newcomers] = np.arange(grains, grains + added)
@@ -50,11 +64,27 @@ def carry_over(old: Assembly, new: Assembly, replaced: int | None = None) -> Non
     new.solver.expect_moves()
 
 
+def _rescale(state: dict[str, np.ndarray], share: float, grains: int) -> None:
+    """Say all that is in quanta in others, ``share`` of which make an old one; so many grains are there."""
+    for kind, number in (("grains", grains), ("bodies", len(state.get("bodies.place", ())))):
+        if number:
+            place, remainder = state[f"{kind}.place"][:number], state[f"{kind}.remainder"][:number]
+            here = place[:, 3] > 0  # the others are parked at the end of the lattice
+            exact = (place[here, :3].astype(float) + remainder[here]) * share
+            place[here, :3], remainder[here] = np.rint(exact), exact - np.rint(exact)
+            if kind == "grains":
+                place[here, 3] = np.maximum(np.rint(place[here, 3] * share), 1)
+    state["skin.width"] *= share
+    if "plungers.states" in state:
+        state["plungers.states"]["shift"] *= share
+
+
 def describe_changes(assembly: Assembly, loaded: GrainTable) -> dict[str, np.ndarray]:
     """What has been changed in a world since it was loaded with this table, as plain arrays that belong to its state."""
     added = {f"added.{name}": getattr(assembly.table, name)[len(loaded) :] for name in _ADDED}
     tools = [model.tool for model in assembly.tools]
     scales = np.array([tool.scale for tool in tools], float)
+    added["lattice.reserve"] = np.array(float(assembly.lattice.reserve))
     return added | {"mesh.path": np.array([tool.mesh for tool in tools], str), "mesh.scale": scales}
 
 
@@ -86,8 +116,13 @@ def fit(assembly: Assembly, loaded: GrainTable, models: dict, state: dict[str, n
             if key not in models:
                 models[key] = model_tool(replace(tools[index].tool, mesh=key[1], scale=key[2]), assembly.scene, _silent)
             tools[index] = models[key]
-    same = table is assembly.table and all(one is other for one, other in zip(tools, assembly.tools, strict=True))
-    return assembly if same else rebuild(assembly, table, tools)
+    reserve = float(state.get("lattice.reserve", assembly.lattice.reserve))
+    same = (
+        table is assembly.table
+        and reserve == assembly.lattice.reserve
+        and all(one is other for one, other in zip(tools, assembly.tools, strict=True))
+    )
+    return assembly if same else rebuild(assembly, table, tools, reserve)
 
 
 def expect_layout(loaded: dict[str, np.ndarray], state: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -67,6 +67,8 @@ class Changeable:
     def set_tool_mesh(self, tool: str, mesh: str, scale: float = 1.0, overlap: float = DEEP) -> None:
         """Give a tool another body at the pose it has; what it does and has done stays, ``reset`` brings the first one back.
 
+        If it reaches farther than any tool before, positions are rounded anew, to a coarser lattice (see ``lattice.py``).
+
         Args:
             tool: name.
             mesh: file, or address as in a scene.

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sampler import MeshError, locate_mesh, read_mesh
 from sand_sim.assemble import Assembly
 from sand_sim.border import CommandError, GrainCloud
 from sand_sim.clearance import as_at_start
@@ -15,12 +16,24 @@ def read_tool(assembly: Assembly, tool: Tool, mesh: str, scale: float) -> ToolMo
     """Sample another mesh for a tool, as the scene would.
 
     Raises:
-        CommandError: if mesh or scale cannot be used.
+        CommandError: if mesh or scale cannot be used, or it is larger than the domain.
     """
     if not (np.isfinite(scale) and scale > 0.0):
         raise CommandError("bad_mesh", f"tool '{tool.name}': scale must be positive, not {scale}")
+    lattice, other = assembly.lattice, replace(tool, mesh=str(mesh), scale=float(scale))
+    widest = float(np.max(lattice.high - lattice.low))
     try:
-        return model_tool(replace(tool, mesh=str(mesh), scale=float(scale)), assembly.scene, lambda stage, share: None)
+        corners = read_mesh(locate_mesh(other.mesh, assembly.scene.folder), other.scale).vertices
+        reach = float(np.linalg.norm(corners, axis=1).max())
+        if reach > widest:  # and would take long to sample
+            raise CommandError(
+                "too_large",
+                f"tool '{tool.name}': the new mesh reaches {reach:.4g} m from the tool frame's origin, the domain is only "
+                f"{widest:.4g} m wide; scale it down",
+            )
+        return model_tool(other, assembly.scene, lambda stage, share: None)
+    except MeshError as error:
+        raise CommandError("bad_mesh", f"tools.{tool.name}.mesh: {error}") from None
     except SceneError as error:
         raise CommandError("bad_mesh", str(error)) from None
 
@@ -37,17 +50,10 @@ def check_tool(assembly: Assembly, tools: list[ToolModel], index: int, pose: tup
         overlap: share of a grain's radius by which it may cut deeper into it than the present one does [1].
 
     Raises:
-        CommandError: if it cuts deeper, asks for a smaller time step, or is too large for the domain's margin.
+        CommandError: if it cuts deeper, or asks for a smaller time step.
     """
-    model, lattice, step = tools[index], assembly.lattice, assembly.time_step
+    model, step = tools[index], assembly.time_step
     name = f"tool '{model.tool.name}'"
-    room = lattice.quantum * lattice.end - 0.5 * float(np.max(lattice.high - lattice.low))
-    if model.extent > room:
-        raise CommandError(
-            "too_large",
-            f"{name}: the new mesh reaches {model.extent:.4g} m from the tool frame's origin, the domain's margin is made "
-            f"for {room:.4g} m; load the scene with it, or scale it down",
-        )
     safe = replace(assembly, tools=tools).safe_step(0.0, 0.0)
     if step.value > 1.0001 * safe and safe < 0.9999 * assembly.safe_step(0.0, 0.0):
         raise CommandError(

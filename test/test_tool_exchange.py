@@ -108,7 +108,7 @@ def test_new_shape_is_what_grains_meet(tmp_path):
         ("deep.stl", 1.0, "blocked", r"cuts into \d+ grains by more than 0.1 of a radius, the deepest at"),
         ("plate.stl", 0.0, "bad_mesh", "scale must be positive"),
         ("plate.stl", np.nan, "bad_mesh", "scale must be positive"),
-        ("plate.stl", 3.0, "too_large", "the domain's margin is made for"),
+        ("plate.stl", 30.0, "too_large", "the domain is only 0.45 m wide"),
         ("plate.stl", 1e-4, "too_fine", "ask for a time step of"),
     ],
 )
@@ -124,6 +124,40 @@ def test_what_does_not_fit_is_refused_and_changes_nothing(tmp_path, mesh, scale,
     assert same_state(world.save(), before)
     with pytest.raises(CommandError, match="'spade' is unknown"):
         world.set_tool_mesh("spade", "plate.stl")
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_larger_tool_widens_the_lattice(tmp_path, precision):
+    """A plate three times as wide, as of a grab that takes up a larger bucket: all else stays where it is to half a quantum."""
+    world = drawn(tmp_path, solver={"precision": precision})
+    world.apply(ToolPose("plate", np.array([0.02, 0.015, 0.08]), NO_TURN))
+    world.step(round(0.1 / world.time_step))
+    world.add_grains([[0.1, 0.1, 0.05]], 0.005)
+    world.remove_grains([7])
+    before, kept, quantum = world.observe(), memories(world), world.assembly.lattice.quantum
+    state = world.save()
+    world.set_tool_mesh("plate", box(tmp_path, "wide.stl", (0.18, 0.18, 0.004)))
+    after, coarser = world.observe(), world.assembly.lattice.quantum
+    assert 1.05 * quantum < coarser < 1.5 * quantum
+    assert world.assembly.lattice.room > world.tools[0].extent
+    assert np.array_equal(after.grains.identity, before.grains.identity)
+    assert np.abs(after.grains.position - before.grains.position).max() <= 0.51 * coarser + 0.5 * quantum + 1e-16
+    assert np.abs(after.grains.radius - before.grains.radius).max() <= 0.51 * coarser + 1e-9 * (precision == "single")
+    found = memories(world)
+    assert found.keys() == kept.keys()
+    assert all(np.array_equal(found[key], kept[key]) for key in found)
+    assert after.health.dissipated == pytest.approx(before.health.dissipated, rel=1e-12)
+    assert after.health.elastic == pytest.approx(before.health.elastic, rel=1e-3)
+    wide = world.save()
+    world.step(200)
+    expected = world.save()
+    fresh = World(world.scene)
+    fresh.restore(wide)
+    fresh.step(200)
+    assert same_state(fresh.save(), expected)
+    world.restore(state)
+    assert world.assembly.lattice.quantum == quantum
+    assert same_state(world.save(), state)
 
 
 def test_states_know_their_tools(tmp_path):
