@@ -50,6 +50,7 @@ class Assembly:
         lattice: the domain.
         recipe: static choices.
         pair_table: ``MaterialPair`` structs, one row per material.
+        plungers: how the walls that move are driven.
         solver: holds the device arrays.
     """
 
@@ -67,6 +68,7 @@ class Assembly:
     lattice: Lattice
     recipe: Recipe
     pair_table: list[list]
+    plungers: list
     solver: ExplicitDem
 
     @cached_property
@@ -117,7 +119,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         if one.terrain
     ]
     walls = [wall for boundary in scene.boundaries for wall in walls_of(boundary)]
-    order = _material_order(scene)
+    order = material_order(scene)
     bodies = [model_body(body, scene, progress) for body in scene.bodies]
     solids = [*walls, *tools, *grounds, *bodies]
     fills = [
@@ -140,26 +142,13 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         smooth_tools=any(tool.smooth for tool in tools),
         surfaces=kinds_of(walls),
     )
-    pairs = _pair_table(scene, order, precision)
     mean = float(table.radius.mean())
     skin, radius = (scene.solver.skin, 0.0) if scene.solver.skin else (_SKIN * mean, mean)
-    arrays = DemArrays(
-        recipe,
-        Setting(np.asarray(scene.gravity), time_step.value, skin, radius, _reach(scene, table, order)),
-        lattice,
-        table,
-        make_surfaces(walls, order, lattice, float(table.radius.min())),
-        [_tool_body(tool, order) for tool in tools]
-        + [ToolBody(ground.body.points, ground.body.radius, order.index(ground.material)) for ground in grounds],
-        pairs,
-        device,
-        make_plungers(walls, float(table.mass[table.lone].sum() + table.bodies.mass.sum())),
-    )
-    numbers, solver = [fill.grains for fill in fills], ExplicitDem(arrays, device)
-    return Assembly(
+    setting = Setting(np.asarray(scene.gravity), time_step.value, skin, radius)
+    assembly = Assembly(
         scene,
         light,
-        numbers,
+        [fill.grains for fill in fills],
         table,
         walls,
         tools,
@@ -170,9 +159,38 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         frame_steps,
         lattice,
         recipe,
-        pairs,
-        solver,
+        _pair_table(scene, order, precision),
+        make_plungers(walls, float(table.mass[table.lone].sum() + table.bodies.mass.sum())),
+        solver=None,
     )
+    return replace(assembly, solver=build_solver(assembly, setting, device))
+
+
+def build_solver(assembly: Assembly, setting: Setting, device) -> ExplicitDem:
+    """A solver for an assembly that is complete but for its own.
+
+    Args:
+        assembly: what it runs; its grains start where the table has them.
+        setting: its numbers; the reach is found here.
+        device: from ``open_device``.
+
+    Raises:
+        SceneError: if the walls cannot hold the grains.
+    """
+    scene, table, order = assembly.scene, assembly.table, material_order(assembly.scene)
+    arrays = DemArrays(
+        assembly.recipe,
+        replace(setting, reach=_reach(scene, table, order)),
+        assembly.lattice,
+        table,
+        make_surfaces(assembly.walls, order, assembly.lattice, float(table.radius.min())),
+        [_tool_body(tool, order) for tool in assembly.tools]
+        + [ToolBody(ground.body.points, ground.body.radius, order.index(ground.material)) for ground in assembly.grounds],
+        assembly.pair_table,
+        device,
+        assembly.plungers,
+    )
+    return ExplicitDem(arrays, device)
 
 
 def _open_device(scene: Scene, spheres: int):
@@ -197,7 +215,7 @@ def _loose_materials(scene: Scene) -> set[str]:
     return {one.material for one in (*scene.fills, *scene.bodies)}
 
 
-def _material_order(scene: Scene) -> list[str]:
+def material_order(scene: Scene) -> list[str]:
     """Names of the materials, those of grains first, so that with one grain material its index is zero."""
     grains = _loose_materials(scene)
     return sorted((m.name for m in scene.materials), key=lambda name: name not in grains)

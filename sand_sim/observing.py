@@ -38,19 +38,24 @@ class StartEnergy:
 def start_energy(assembly: Assembly) -> StartEnergy:
     """The balance at time zero and what it may be wrong by.
 
-    Potential energies are rounded, as if nothing of that cancelled out. A contact that begins in the middle of a step is wrong
-    by up to ``(v dt/(2 d_max))^2.5`` of the energy of an impact at the expected speed, 8e-4 for a step of 1/25 contact time.
+    A contact that begins in the middle of a step is wrong by up to ``(v dt/(2 d_max))^2.5`` of the energy of an impact at the
+    expected speed, 8e-4 for a step of 1/25 contact time.
     """
-    lattice, sums = assembly.lattice, assembly.solver.measure()
-    mass = assembly.solver.arrays.grains.motion.numpy()[:, 3].astype(float)
-    weight, span = mass.sum() * np.linalg.norm(assembly.scene.gravity), np.linalg.norm(lattice.high - lattice.low)
+    sums, mass = assembly.solver.measure(), assembly.solver.arrays.grains.motion.numpy()[:, 3]
     return StartEnergy(
         total=sums.translation + sums.rotation + sums.height + sums.elastic,
         height=sums.height,
-        rounding=float(assembly.recipe.precision.epsilon * weight * 0.5 * span),
+        rounding=balance_rounding(assembly),
         grains=count_grains(assembly),
-        per_contact=float(_CONTACT_BEGINS * 0.5 * np.median(mass) * assembly.time_step.speed**2),
+        per_contact=float(_CONTACT_BEGINS * 0.5 * np.median(mass.astype(float)) * assembly.time_step.speed**2),
     )
+
+
+def balance_rounding(assembly: Assembly) -> float:
+    """What the balance may be wrong by because potential energies are rounded, as if nothing of that cancelled out [J]."""
+    lattice, mass = assembly.lattice, assembly.solver.arrays.grains.motion.numpy()[:, 3].astype(float)
+    weight, span = mass.sum() * np.linalg.norm(assembly.scene.gravity), np.linalg.norm(lattice.high - lattice.low)
+    return float(assembly.recipe.precision.epsilon * weight * 0.5 * span)
 
 
 def observe_spheres(assembly: Assembly) -> GrainCloud:

@@ -61,11 +61,13 @@ class SweptGround:
             self._passed[index] = []
         return self.volumes
 
-    def replace_tool(self, index: int, model: ToolModel) -> None:
-        """Give a tool another body where it is; what that lies in has been swept."""
-        self._tools[index], self._surfaces[index] = model, SignedDistance(model.mesh)
-        inside = self._inside(index, np.argwhere(self.ground & ~self.swept[index]))
-        self.swept[index][tuple(inside.T)] = True
+    def set_tools(self, tools: list[ToolModel]) -> None:
+        """Give tools other bodies where they are; what these lie in has been swept."""
+        for index, model in enumerate(tools):
+            if model is not self._tools[index]:
+                self._tools[index], self._surfaces[index] = model, SignedDistance(model.mesh)
+                inside = self._inside(index, np.argwhere(self.ground & ~self.swept[index]))
+                self.swept[index][tuple(inside.T)] = True
 
     def save(self) -> dict[str, np.ndarray]:
         """What has been swept, as plain arrays."""
@@ -96,13 +98,13 @@ class SweptGround:
         middles = self.low + (cells + 0.5) * self.cell
         near = np.linalg.norm(middles - position, axis=1) < model.extent
         local = rotation.rotate(rotation.inverse(orientation), middles[near] - position)
-        return cells[near][self._surfaces[index].query(local)[0] < model.body.radius] if near.any() else cells[:0]
+        return cells[near][self._surfaces[index].query(local)[0] < model.margin] if near.any() else cells[:0]
 
     def _sweep(self, index: int, begin: np.ndarray, turn: np.ndarray, end: np.ndarray, end_turn: np.ndarray) -> None:
         """Mark the cells that a tool passes through as it moves evenly from one pose to another."""
         model, way = self._tools[index], np.asarray(end) - begin
         spin = rotation.to_vector(rotation.multiply(end_turn, rotation.inverse(turn)))
-        angle, radius = float(np.linalg.norm(spin)), model.body.radius
+        angle, radius = float(np.linalg.norm(spin)), model.margin
         if angle == 0.0 and not way.any():
             return
         cells = self._candidates(index, [(begin, turn), (end, end_turn)], radius + model.extent * angle**2 / 8.0)

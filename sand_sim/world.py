@@ -8,9 +8,11 @@ from sand_sim import rotation
 from sand_sim.assemble import Assembly, assemble
 from sand_sim.beforehand import find_coarseness, find_fine_tools, find_overlap
 from sand_sim.border import CommandError, Health, Observation, ToolContacts, ToolPose, ToolVelocity
+from sand_sim.carrying_over import describe_changes, fit
+from sand_sim.changing import Changeable
 from sand_sim.commands import Command, check_command, pose_after
 from sand_sim.contact_reading import observe_tool_contacts
-from sand_sim.engine.explicit_dem import UnstableError
+from sand_sim.engine.explicit_dem import ExplicitDem, UnstableError
 from sand_sim.engine.tools import ToolTrack
 from sand_sim.integrator import VERLET
 from sand_sim.observing import (
@@ -23,18 +25,18 @@ from sand_sim.observing import (
     observe_walls,
     start_energy,
 )
-from sand_sim.scene.types import Scene, SceneError
+from sand_sim.scene.types import Scene
+from sand_sim.settling import settle, strike_off
 from sand_sim.sweeping import SweptGround
 from sand_sim.tool_model import Progress, ToolModel
 from sand_sim.track import Track
 from sand_sim.trust import BLOWN_UP, GAINED, gained_share
 
-_SETTLE_CHUNKS = 50
 _SPEED_TOLERANCE = 1.02
 _FEWEST_BETWEEN = 100  # steps between two states that are kept, so that keeping them stays below 3 % of the time
 
 
-class World:
+class World(Changeable):
     """Grains, walls and tools of a scene, settled as it asks.
 
     Args:
@@ -48,23 +50,29 @@ class World:
     def __init__(self, scene: Scene, progress: Progress = lambda stage, share: None):
         self.scene = scene
         self.assembly: Assembly = assemble(scene, progress)
-        self._solver = self.assembly.solver
         self._tool_index = {tool.name: k for k, tool in enumerate(scene.tools)}
         self._grounds = [Track.rest(ground.pose) for ground in self.assembly.grounds]
         self._set_tracks([Track.rest(tool.pose) for tool in scene.tools])
         self._solver.renew_lists()
-        self._beforehand = find_overlap(self.assembly) + find_fine_tools(self.assembly) + find_coarseness(self.assembly)
-        self._settle(progress)
-        self._strike_off()
+        self._overlap = find_overlap(self.assembly)
+        self._beforehand = self._overlap + find_fine_tools(self.assembly) + find_coarseness(self.assembly)
+        settle(self.assembly, self._beforehand, progress)
+        strike_off(self.assembly)
         self._solver.begin()
         self._solver.engage_plungers()
         self._start = start_energy(self.assembly)
         tools = self._solver.arrays.tools
         self._observed_steps, self._observed_wrench = 0, tools.wrench.numpy().copy() if tools else None
-        spheres, poses = observe_spheres(self.assembly), [track.at(0.0) for track in self._tracks]
+        spheres, poses = observe_spheres(self.assembly), self._poses
         self._swept = SweptGround(spheres, self.assembly.tools, poses)
+        self._loaded = self.assembly.table
+        self._models = {(k, model.tool.mesh, model.tool.scale): model for k, model in enumerate(self.tools)}
         self._initial = self.save()
         self.reset()
+
+    @property
+    def _solver(self) -> ExplicitDem:
+        return self.assembly.solver
 
     @property
     def time(self) -> float:
@@ -182,6 +190,10 @@ class World:
         self._health()
         return observe_tool_contacts(self.assembly, tool)
 
+    @property
+    def _poses(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        return [track.at(self.time) for track in self._tracks]
+
     def _index_of(self, tool: str) -> int:
         if tool not in self._tool_index:
             raise CommandError("unknown_tool", f"tool '{tool}' is unknown; known are {', '.join(self._tool_index) or 'none'}")
@@ -189,7 +201,7 @@ class World:
 
     def _sweep(self) -> np.ndarray:
         """Volumes swept by the tools up to now, shape (tools,) [m^3]."""
-        return self._swept.advance([track.at(self.time) for track in self._tracks])
+        return self._swept.advance(self._poses)
 
     def _mean_wrenches(self, steps: int) -> np.ndarray | None:
         """Mean wrenches on the tools since the last observation, those of now if no time has passed."""
@@ -218,7 +230,7 @@ class World:
         for name in Track.__dataclass_fields__:
             state[f"track.{name}"] = np.array([getattr(track, name) for track in self._tracks])
         self._sweep()
-        state |= self._swept.save()
+        state |= self._swept.save() | describe_changes(self.assembly, self._loaded)
         state["start"] = np.array(astuple(self._start))
         state["observed_steps"] = np.array(self._observed_steps)
         if self._observed_wrench is not None:
@@ -226,14 +238,19 @@ class World:
         return state
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
-        """Put a state from ``save`` back."""
+        """Put a state from ``save`` back; grains that have been added or removed since, and tools, become what they were.
+
+        Raises:
+            ValueError: if the state is of another scene; nothing is changed then.
+        """
+        self.assembly = fit(self.assembly, self._loaded, self._models, state)
         self._solver.put_state(state)
         columns = [state[f"track.{name}"] for name in Track.__dataclass_fields__]
         self._tracks = [Track(*values) for values in zip(*columns, strict=True)]
+        self._look_anew()
         self._swept.restore(state)
         self._start = StartEnergy(*(float(value) for value in state["start"]))
         self._observed_steps, self._observed_wrench = int(state["observed_steps"]), state.get("observed_wrench")
-        self._measured: tuple[int, Health] | None = None
         self._good, self._good_health, self._kept_steps = state, self._health(), self._solver.steps_done
 
     def _health(self) -> Health:
@@ -278,33 +295,3 @@ class World:
             structs.append(one)
         if structs:
             self._solver.arrays.tools.set_tracks(structs)
-
-    def _settle(self, progress: Progress) -> None:
-        settle = self.scene.settle
-        if settle.time <= 0.0:
-            return
-        chunk = max(1, round(settle.time / _SETTLE_CHUNKS / self.time_step))
-        for done in range(_SETTLE_CHUNKS):
-            try:
-                self._solver.run(chunk)
-            except UnstableError as error:
-                why = "; ".join(self._beforehand) or f"try a smaller time step than {self.time_step:.2g} s"
-                raise SceneError(f"settle: the bed blows up while it settles: {error}; {why}") from None
-            self._solver.measure()
-            cloud = observe_grains(self.assembly)
-            speed = np.sqrt(np.sum(cloud.mass * cloud.speed**2) / np.sum(cloud.mass))
-            progress("settling", (done + 1) / _SETTLE_CHUNKS)
-            if speed < settle.speed:
-                progress("settling", 1.0)
-                break
-
-    def _strike_off(self) -> None:
-        """Take away what lies above the asked height of a fill."""
-        cloud, first = observe_grains(self.assembly), 0
-        for fill, number in zip(self.scene.fills, self.assembly.fill_numbers, strict=True):
-            if fill.height is not None:
-                own = (cloud.identity >= first) & (cloud.identity < first + number)
-                above = cloud.position[:, 2] + cloud.radius > fill.low[2] + fill.height
-                gone = cloud.identity[own & above]
-                self._solver.remove(np.flatnonzero(np.isin(self.assembly.table.grain, gone)))
-            first += number

@@ -61,9 +61,9 @@ def test_hundred_thousand_grains_are_fast():
     cloud = cloud_of(random.uniform(0.0, [1.0, 1.0, 0.1], (100_000, 3)), random.uniform(0.004, 0.006, 100_000))
     best = np.inf
     for _ in range(5):
-        begin = time.perf_counter()
+        begin = time.process_time()
         make_height_map(cloud, [0.0, 0.0], 0.01, (100, 100))
-        best = min(best, time.perf_counter() - begin)
+        best = min(best, time.process_time() - begin)
     print(f"{1e3 * best:.1f} ms")
     assert best < 0.05
 

@@ -118,8 +118,8 @@ def test_world_reports_and_keeps_it(tmp_path):
 def test_cost_beside_a_frame_is_small(bed, blade):
     ground, best = SweptGround(bed, [blade], [(np.array([0.1, 0.0, -0.05]), NO_TURN)]), []
     for x in np.linspace(0.1, 0.5, 40):
-        begin = time.perf_counter()
+        begin = time.process_time()
         ground.advance([(np.array([x, 0.0, -0.05]), NO_TURN)])
-        best.append(time.perf_counter() - begin)
+        best.append(time.process_time() - begin)
     print(f"{1e3 * np.median(best):.2f} ms")
     assert np.median(best) < 0.01

@@ -40,6 +40,11 @@ class Lattice:
         return (half + max(self.reserve, 0.02 * half)) / self.end
 
     @property
+    def room(self) -> float:
+        """Width of the margin around the domain [m]: how far a tool may reach from its frame's origin."""
+        return self.quantum * self.end - 0.5 * float(np.max(self.high - self.low))
+
+    @property
     def end(self) -> int:
         """Largest lattice coordinate; grains that have left the domain are parked there."""
         return 2**self.precision.lattice_bits - 1

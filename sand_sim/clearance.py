@@ -1,0 +1,89 @@
+"""Whether spheres fit where they are asked for: clear of grains, of each other, of walls, tools, terrains and bodies."""
+
+import numpy as np
+
+from sand_sim import rotation
+from sand_sim.assemble import Assembly
+from sand_sim.border import GrainCloud
+from sand_sim.observing import observe_bodies, observe_grains
+from sand_sim.scene.types import Pose
+
+_TOUCH = 1e-6  # of a radius: what may overlap by rounding
+
+
+def find_obstacles(
+    assembly: Assembly, spheres: GrainCloud, poses: list, position: np.ndarray, radius: np.ndarray
+) -> dict[str, np.ndarray]:
+    """What is in the way of new spheres.
+
+    Args:
+        assembly: the world's, measured.
+        spheres: from ``observe_spheres``.
+        poses: position [m] and orientation of each tool now.
+        position: of the new spheres, shape (n, 3) [m].
+        radius: shape (n,) [m].
+
+    Returns:
+        For each obstacle by name, which of the new spheres overlap it, shape (k,) int; empty if all are clear.
+    """
+    spare = _TOUCH * radius + 2.0 * assembly.lattice.quantum
+    grains, _ = overlapping(position, radius - spare, spheres.position, spheres.radius.astype(float))
+    one, other = overlapping(position, radius - 0.5 * spare, position, radius - 0.5 * spare)
+    blocked = {"grains": grains, "one another": one[one != other]}
+    for wall, offset in zip(assembly.walls, _offsets(assembly), strict=True):
+        near = wall.distance(position - offset * wall.direction) < radius - spare
+        blocked[f"wall '{wall.name}'"] = np.flatnonzero(near)
+    solids = [(f"tool '{m.tool.name}'", m, m.tool.pose, pose) for m, pose in zip(assembly.tools, poses, strict=True)]
+    solids += [(f"terrain '{g.name}'", g, g.pose, (g.place, g.pose.orientation)) for g in assembly.grounds]
+    models = {model.body.name: model for model in assembly.bodies}
+    for report in observe_bodies(assembly, observe_grains(assembly, spheres)):
+        model = models[report.name]
+        solids.append((f"body '{report.name}'", model, model.body.pose, (report.position, report.orientation)))
+    for name, solid, start, now in solids:
+        blocked[name] = np.flatnonzero(solid.distance(as_at_start(position, start, now)) < radius - spare)
+    return {name: np.unique(which) for name, which in blocked.items() if len(which)}
+
+
+def overlapping(
+    position: np.ndarray, radius: np.ndarray, others: np.ndarray, their_radius: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """All pairs of a sphere and one of some others that overlap, by their rows; found in cells as wide as the widest pair."""
+    if not (len(position) and len(others)):
+        return np.zeros(0, int), np.zeros(0, int)
+    cell = float(radius.max() + their_radius.max())
+    low = position.min(axis=0) - cell
+    near = np.flatnonzero(np.all((others > low) & (others < position.max(axis=0) + cell), axis=1))
+    size = (np.floor((position.max(axis=0) - low) / cell) + 3).astype(np.int64)
+
+    def key(cells):
+        return (cells[:, 2] * size[1] + cells[:, 1]) * size[0] + cells[:, 0]
+
+    keys = key(np.floor((others[near] - low) / cell).astype(np.int64))
+    order = np.argsort(keys, kind="stable")
+    keys, near = keys[order], near[order]
+    home, found = np.floor((position - low) / cell).astype(np.int64), []
+    for row in np.ndindex(3, 3):  # the three cells along x follow one another
+        left, right = (home + np.array([end, row[0] - 1, row[1] - 1]) for end in (-1, 1))
+        begin = np.searchsorted(keys, key(left))
+        number = np.searchsorted(keys, key(right), side="right") - begin
+        first = np.repeat(np.arange(len(position)), number)
+        second = near[np.repeat(begin - np.cumsum(number) + number, number) + np.arange(number.sum())]
+        apart = position[first] - others[second]
+        meet = np.einsum("ij,ij->i", apart, apart) < (radius[first] + their_radius[second]) ** 2
+        found.append((first[meet], second[meet]))
+    return tuple(np.concatenate(column) for column in zip(*found, strict=True))
+
+
+def _offsets(assembly: Assembly) -> np.ndarray:
+    """How far each wall has moved along its direction, shape (walls,) [m]."""
+    arrays, offsets = assembly.solver.arrays, np.zeros(len(assembly.walls))
+    if arrays.plungers:
+        plunger = arrays.walls.numpy()["plunger"]
+        offsets[plunger >= 0] = arrays.plungers.states.numpy()["offset"][plunger[plunger >= 0]]
+    return offsets
+
+
+def as_at_start(position: np.ndarray, start: Pose, now: tuple) -> np.ndarray:
+    """World points as a thing saw them from where it started, shape (n, 3) [m]."""
+    local = rotation.rotate(rotation.inverse(np.asarray(now[1])), position - np.asarray(now[0]))
+    return np.asarray(start.position) + rotation.rotate(np.asarray(start.orientation), local)

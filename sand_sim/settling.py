@@ -1,0 +1,53 @@
+"""What happens to a world before its time zero: grains come to rest, and what lies too high is struck off."""
+
+import numpy as np
+
+from sand_sim.assemble import Assembly
+from sand_sim.engine.explicit_dem import UnstableError
+from sand_sim.observing import observe_grains
+from sand_sim.scene.types import SceneError
+from sand_sim.tool_model import Progress
+
+_CHUNKS = 50
+
+
+def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> None:
+    """Let the grains come to rest as the scene asks.
+
+    Args:
+        assembly: the world's.
+        doubts: that were there before the first step.
+        progress: called with the name of the stage and the share of it that is done, 0 to 1.
+
+    Raises:
+        SceneError: if the bed blows up.
+    """
+    asked, step = assembly.scene.settle, assembly.time_step.value
+    if asked.time <= 0.0:
+        return
+    chunk = max(1, round(asked.time / _CHUNKS / step))
+    for done in range(_CHUNKS):
+        try:
+            assembly.solver.run(chunk)
+        except UnstableError as error:
+            why = "; ".join(doubts) or f"try a smaller time step than {step:.2g} s"
+            raise SceneError(f"settle: the bed blows up while it settles: {error}; {why}") from None
+        assembly.solver.measure()
+        cloud = observe_grains(assembly)
+        speed = np.sqrt(np.sum(cloud.mass * cloud.speed**2) / np.sum(cloud.mass))
+        progress("settling", (done + 1) / _CHUNKS)
+        if speed < asked.speed:
+            progress("settling", 1.0)
+            break
+
+
+def strike_off(assembly: Assembly) -> None:
+    """Take away what lies above the asked height of a fill."""
+    cloud, first = observe_grains(assembly), 0
+    for fill, number in zip(assembly.scene.fills, assembly.fill_numbers, strict=True):
+        if fill.height is not None:
+            own = (cloud.identity >= first) & (cloud.identity < first + number)
+            above = cloud.position[:, 2] + cloud.radius > fill.low[2] + fill.height
+            gone = cloud.identity[own & above]
+            assembly.solver.remove(np.flatnonzero(np.isin(assembly.grain_of_sphere, gone)))
+        first += number
