@@ -1,6 +1,7 @@
 """A running world: commands in, steps, observations out."""
 
 from dataclasses import astuple
+from functools import cached_property
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from sand_sim.border import CommandError, Health, Observation, ToolContacts, Too
 from sand_sim.commands import Command, check_command, pose_after
 from sand_sim.contact_reading import observe_tool_contacts
 from sand_sim.engine.explicit_dem import UnstableError
+from sand_sim.engine.state_check import check_layout, check_numbers
 from sand_sim.engine.tools import ToolTrack
 from sand_sim.integrator import VERLET
 from sand_sim.observing import (
@@ -24,6 +26,7 @@ from sand_sim.observing import (
     start_energy,
 )
 from sand_sim.scene.types import Scene, SceneError
+from sand_sim.scene_identity import describe_scene
 from sand_sim.sweeping import SweptGround
 from sand_sim.tool_model import Progress, ToolModel
 from sand_sim.track import Track
@@ -70,6 +73,21 @@ class World:
     def time(self) -> float:
         """Simulated time [s]."""
         return self._solver.steps_done * self.time_step
+
+    @property
+    def steps(self) -> int:
+        """Time steps since time zero."""
+        return self._solver.steps_done
+
+    @property
+    def observed(self) -> bool:
+        """Whether the present state has been observed."""
+        return self._observed_steps == self.steps
+
+    @cached_property
+    def identity(self) -> dict:
+        """What a state must have in common with this world, see ``scene_identity``; read off the scene's files once."""
+        return describe_scene(self.assembly)
 
     @property
     def time_step(self) -> float:
@@ -224,6 +242,15 @@ class World:
         if self._observed_wrench is not None:
             state["observed_wrench"] = self._observed_wrench
         return state
+
+    def check_state(self, state: dict[str, np.ndarray]) -> None:
+        """See that arrays of doubtful origin can be a state of this world.
+
+        Raises:
+            StateError: naming the array that cannot.
+        """
+        check_layout(state, self._initial)
+        check_numbers(self.assembly.solver.arrays, state)
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Put a state from ``save`` back."""
