@@ -131,7 +131,8 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
             raise
         sync_folder(path.parent)
     except OSError as error:
-        raise CheckpointError(f"{path}: cannot be written: {error.strerror or error}") from None
+        where = f": {error.filename}" if error.filename and Path(error.filename) not in (path, writing) else ""
+        raise CheckpointError(f"{path}: cannot be written: {error.strerror or error}{where}") from None
 
 
 def read_checkpoint(path: Path) -> Checkpoint:

@@ -46,6 +46,8 @@ class CheckpointFolder:
         self, folder: Path, name: str, period: float = PERIOD, report: Callable[[str], None] = lambda line: None, kept: int = KEPT
     ):
         self.folder, self.period, self._name, self._report, self._kept = Path(folder), period, name, report, kept
+        if not period >= 0.0:
+            raise CheckpointError(f"--checkpoint-period: must be 0 s or more, got {period:g}")
         self._pattern = re.compile(re.escape(name) + r"\.(\d+)\.checkpoint")
         try:
             self.folder.mkdir(parents=True, exist_ok=True)

@@ -150,15 +150,13 @@ def put(name, value):
         (put("grains.number", 10**6), "grains.number"),
         (put("grains.motion", np.nan), "grains.motion"),
         (put("met.order", 10**8), "met.order"),
-        (put("tools.states", np.array((1, 2, np.inf, 3), dtype=[("a", "i4"), ("b", "i4"), ("c", "f4"), ("d", "i4")])), None),
+        (put("tools.travelled", np.inf), "tools.travelled"),
         (lambda state: state.pop("grains.spin"), "grains.spin"),
         (lambda state: state.update({"grains.place": state["grains.place"][:5]}), "grains.place"),
         (lambda state: state.update({"grains.place": state["grains.place"].astype(float)}), "grains.place"),
     ],
 )
 def test_a_strangers_state_is_refused_before_a_kernel_sees_it(world, written, change, word):
-    if word is None:
-        return
     rewritten(written, change)
     before = world.save()
     with pytest.raises(DamagedCheckpointError, match=rf"holds no state of this scene: .*{word}"):
@@ -208,12 +206,12 @@ def test_another_scene_is_refused_by_field(written, scene_path, tmp_path, change
 def test_contents_of_files_count(written, scene_path, tmp_path):
     mesh = (scene_path.parent / "plate.stl").read_bytes()
     (tmp_path / "plate.stl").write_bytes(mesh[:-20] + b"\x3c" + mesh[-19:])
-    with pytest.raises(OtherSceneError, match="tools.plate.mesh is sha256"):
+    with pytest.raises(OtherSceneError, match=r"tools\.plate\.mesh is sha256"):
         load_checkpoint(written, World(changed(scene_path, tmp_path)))
     (tmp_path / "plate.stl").write_bytes(mesh)
     with np.load(scene_path.parent / "bed.npz") as bed:
         np.savez(tmp_path / "bed.npz", position=bed["position"] + [0.0, 0.0, 1e-4], radius=bed["radius"])
-    with pytest.raises(OtherSceneError, match="fills.0.file is sha256"):
+    with pytest.raises(OtherSceneError, match=r"fills\.0\.file is sha256"):
         load_checkpoint(written, World(changed(scene_path, tmp_path)))
 
 
