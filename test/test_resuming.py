@@ -130,7 +130,7 @@ def test_a_bad_file_changes_nothing_and_is_named(scene, uninterrupted, tmp_path)
                 running.simulation.load_state(bad).result(30.0)
         blocked = tmp_path / "file"
         blocked.touch()
-        with pytest.raises(CheckpointError, match="cannot be written: File exists: .*file"):
+        with pytest.raises(CheckpointError, match=r"cannot be written: File exists: .*file"):
             running.simulation.save_state(blocked / "below").result(30.0)
         running.wait_until(scene.duration)
         assert_equal(running, uninterrupted)

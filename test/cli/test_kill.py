@@ -128,3 +128,17 @@ def test_refusals(tmp_path):
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert "made in another scene: gravity.2 is -9.81 there and -1.6 here" in errors
+
+
+def test_files_that_cannot_be_written_do_not_stop_a_run(tmp_path):
+    """The simulation goes to its end, each trouble is one line, and the exit code tells."""
+    scene = write_small_scene(tmp_path)
+    (tmp_path / "blocked").touch()
+    process = sand_sim(tmp_path, "run", scene, "--out", "blocked")
+    output, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert "0.40 s in" in output
+    assert "Traceback" not in errors
+    lines = [line for line in errors.splitlines() if "blocked" in line]
+    assert sum("goes on" in line for line in lines) == 1
+    assert len(lines) == 5, errors  # that one, and each file at the end
