@@ -28,7 +28,7 @@ def world(tmp_path):
 @pytest.fixture(autouse=True)
 def no_waiting(monkeypatch):
     """Every frame is written and looked after."""
-    monkeypatch.setattr("sand_sim.sinks.recording_file._EVERY", 0.0)
+    monkeypatch.setattr("sand_sim.sinks.recording_file._RETRY", 0.02)
     monkeypatch.setattr("sand_sim.sinks.viewer._EVERY", 0.0)
 
 
@@ -36,6 +36,24 @@ def frames(recorder, world, number):
     for _ in range(number):
         world.step(100)
         recorder.write(world.observe())
+
+
+def frames_until(recorder, world, condition):
+    """Go on until something has come of it; how many frames it took."""
+    begin, number = time.monotonic(), 0
+    while not condition():
+        assert time.monotonic() - begin < 20.0
+        frames(recorder, world, 1)
+        time.sleep(0.01)
+        number += 1
+    return number
+
+
+def is_sound(path):
+    """Whether Rerun finds nothing wrong with a recording."""
+    return (
+        subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", path], capture_output=True, check=False).returncode == 0
+    )
 
 
 def times_in(path):
@@ -53,6 +71,7 @@ def test_a_recording_holds_each_frame(world, tmp_path):
     frames(recorder, world, 7)
     assert recorder.close() == [tmp_path / "run.rrd"]
     assert times_in(tmp_path / "run.rrd") == 7 + 1, "and the radii, which are drawn once"
+    assert is_sound(tmp_path / "run.rrd")
 
 
 def test_a_full_disk_is_told_once_and_nothing_is_lost(world, tmp_path, monkeypatch):
@@ -60,65 +79,73 @@ def test_a_full_disk_is_told_once_and_nothing_is_lost(world, tmp_path, monkeypat
     recorder = Recorder(world, tmp_path / "run.rrd", report=told.append)
     frames(recorder, world, 3)
     with monkeypatch.context() as patch:
-        patch.setattr("sand_sim.sinks.recording_file.RecordingFile._append", fail)
+        patch.setattr("sand_sim.sinks.recording_file._Pump._append", fail)
+        number = frames_until(recorder, world, lambda: told)
         frames(recorder, world, 5)
-    frames(recorder, world, 2)
+    number += frames_until(recorder, world, lambda: len(told) > 1)
     recorder.close()
     assert len(told) == 2
     assert "No space left on device; the simulation goes on" in told[0]
     assert told[1].endswith("goes on")
     assert recorder.failed == []
-    assert times_in(tmp_path / "run.rrd") == 11
+    assert times_in(tmp_path / "run.rrd") == 3 + 5 + number + 1
+    assert is_sound(tmp_path / "run.rrd")
 
 
 def fail(*_):
     raise FULL
 
 
-def test_half_a_piece_is_taken_back(world, tmp_path):
-    """A disk that is full in the middle of a write leaves no torn bytes; a limit on the size of files plays the disk."""
-
+def test_a_disk_that_is_full_in_the_middle_of_a_write(world, tmp_path):
+    """A limit on the size of files plays the disk."""
     told = []
     recorder = Recorder(world, tmp_path / "run.rrd", report=told.append)
     frames(recorder, world, 3)
-    sound = (tmp_path / "run.rrd").stat().st_size
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (sound + 500, before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50_001, before[1]))
     try:
-        frames(recorder, world, 4)
-        assert (tmp_path / "run.rrd").stat().st_size == sound
+        number = frames_until(recorder, world, lambda: told)
+        assert (tmp_path / "run.rrd").stat().st_size == 50_001
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
         signal.signal(signal.SIGXFSZ, ignored)
-    frames(recorder, world, 1)
+    number += frames_until(recorder, world, lambda: len(told) > 1)
     recorder.close()
     assert len(told) == 2
     assert "File too large" in told[0]
-    assert times_in(tmp_path / "run.rrd") == 9
+    assert times_in(tmp_path / "run.rrd") == 3 + number + 1
+    assert is_sound(tmp_path / "run.rrd")
 
 
 def test_what_waits_for_a_disk_has_a_bound(world, tmp_path, monkeypatch):
+    """Beyond it frames are missing, and the recording goes on in a second file when there is room again."""
     told = []
     monkeypatch.setattr("sand_sim.sinks.recording_file._MOST_WAITING", 100_000)
     recorder = Recorder(world, tmp_path / "run.rrd", report=told.append)
     with monkeypatch.context() as patch:
-        patch.setattr("sand_sim.sinks.recording_file.RecordingFile._append", fail)
-        frames(recorder, world, 30)
-    frames(recorder, world, 2)
-    assert recorder.close() == []
-    assert recorder.failed == [tmp_path / "run.rrd"]
+        patch.setattr("sand_sim.sinks.recording_file._Pump._append", fail)
+        pump = next(iter(recorder._sinks.values()))._pump
+        frames_until(recorder, world, lambda: pump.lost)
+    frames_until(recorder, world, lambda: len(told) > 1)
+    frames(recorder, world, 3)
+    assert recorder.close() == [tmp_path / "run.rrd"]
+    assert recorder.failed == [tmp_path / "run.2.rrd"]
     assert "bytes are missing" in told[-1]
-    assert 3 < times_in(tmp_path / "run.rrd") < 32, "what is there can be read"
+    assert times_in(tmp_path / "run.2.rrd") >= 3
+    assert is_sound(tmp_path / "run.2.rrd")
 
 
 def test_a_deleted_recording_is_begun_again(world, tmp_path):
-    recorder = Recorder(world, tmp_path / "sub" / "run.rrd")
+    path = tmp_path / "sub" / "run.rrd"
+    recorder = Recorder(world, path)
+    frames_until(recorder, world, path.exists)
+    path.unlink()
+    frames_until(recorder, world, path.exists)
     frames(recorder, world, 3)
-    (tmp_path / "sub" / "run.rrd").unlink()
-    frames(recorder, world, 3)
-    recorder.close()
-    assert times_in(tmp_path / "sub" / "run.rrd") == 3
+    assert recorder.close() == [path]
+    assert times_in(path) >= 4
+    assert is_sound(path)
 
 
 def test_a_folder_that_cannot_be_written(world, tmp_path):
@@ -126,16 +153,17 @@ def test_a_folder_that_cannot_be_written(world, tmp_path):
     told, blocked = [], tmp_path / "out"
     blocked.touch()
     recorder = Recorder(world, blocked / "run.rrd", blocked, report=told.append)
+    number = frames_until(recorder, world, lambda: told)
     frames(recorder, world, 3)
     assert len(told) == 1
-    assert "File exists" in told[0] or "Not a directory" in told[0]
+    assert "File exists" in told[0]
     blocked.unlink()
-    frames(recorder, world, 2)
+    number += 3 + frames_until(recorder, world, lambda: len(told) > 1)
     assert len(recorder.close()) >= 3
     assert recorder.failed == []
-    assert times_in(blocked / "run.rrd") == 6
+    assert times_in(blocked / "run.rrd") == number + 1
     with np.load(blocked / "small.npz") as history:
-        assert len(history["time"]) == 5
+        assert len(history["time"]) == number
 
 
 def test_files_that_cannot_be_written_at_the_end_are_named(world, tmp_path):

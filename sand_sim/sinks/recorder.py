@@ -66,18 +66,18 @@ class Recorder:
         """Finish all files.
 
         Returns:
-            The files written.
+            The files written, as far as they go.
         """
         files = []
         for sink in self._sinks.values():
             sink.close()
-            path = getattr(sink, "path", None)
-            if path and (sink.trouble or sink.lost):
-                why = f"{sink.lost} bytes are missing: the disk was full for too long" if sink.lost else sink.trouble
-                self._report(f"recording {path}: {why}")
-                self.failed.append(path)
-            elif path:
-                files.append(path)
+            files += sink.finished
+            if sink.path and (sink.trouble or sink.lost):
+                why = sink.trouble or f"{sink.lost} bytes are missing, more than could wait for the disk"
+                self._report(f"recording {sink.path}: {why}")
+                self.failed.append(sink.path)
+            elif sink.path:
+                files.append(sink.path)
         if self._output is None or self.log.last is None:
             return files
         begin = self._output / self._world.scene.name

@@ -32,11 +32,13 @@ class Viewer:
 
     Attributes:
         trouble: why it is not fed at present, empty if it is.
-        lost: bytes that had to be dropped; none are counted, because a viewer shows what is now.
+        path, finished: no files are written.
     """
 
+    path, finished = None, ()
+
     def __init__(self, world: World, particles: bool, identity: str, port: int = PORT):
-        self.trouble, self.lost = "", 0
+        self.trouble = ""
         self._world, self._particles, self._identity, self._port = world, particles, identity, port
         self._stream: rr.RecordingStream | None = None
         self._looked = 0.0
