@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sand_sim.engine.state_check import StateError
+from sand_sim.engine.state_check import StateError, check_layout, check_numbers
 from sand_sim.scene_identity import find_difference
 from sand_sim.world import World
 
@@ -90,11 +90,12 @@ def load_checkpoint(path: Path, world: World, take_over: Callable[[Checkpoint], 
         raise OtherSceneError(
             f"{path}: was made with time steps of {then.get('time_step')} s, this world's are {now['time_step']} s"
         )
+    before = world.save()
     try:
-        world.check_state(checkpoint.state)
+        check_layout(checkpoint.state, before)
+        check_numbers(world.assembly.solver.arrays, checkpoint.state)
     except StateError as error:
         raise DamagedCheckpointError(f"{path}: holds no state of this scene: {error}") from None
-    before = world.save()
     try:
         world.restore(checkpoint.state)
         take_over(checkpoint)

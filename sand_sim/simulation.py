@@ -24,7 +24,7 @@ from sand_sim.checkpoints import CheckpointFolder
 from sand_sim.commands import Command
 from sand_sim.courses import USUAL, Courses, StampRules
 from sand_sim.engine.explicit_dem import UnstableError
-from sand_sim.pending import pack_courses, unpack_courses
+from sand_sim.pending import pack_told, unpack_told
 from sand_sim.world import World
 
 PACINGS = ("realtime", "fast", "lockstep")
@@ -298,12 +298,7 @@ class Simulation:
         self._on_frame(self.world.observe())
 
     def _checkpoint(self) -> Checkpoint:
-        told = {
-            "courses": pack_courses(self.courses),
-            "frame_end": self._frame_end,
-            "rejected": dict(self.rejected),
-            "limited": int(self.courses.limited),
-        }
+        told = pack_told(self.courses, self.rejected, self._frame_end)
         return take_checkpoint(self.world, told, self._pack_history())
 
     def _load(self, path: Path) -> float:
@@ -314,17 +309,10 @@ class Simulation:
 
     def _take_over(self, checkpoint: Checkpoint) -> None:
         """Go on with the commands and the history of a checkpoint whose state the world has."""
-        told, now = checkpoint.commands, self.world.time
-        try:
-            courses = unpack_courses(told.get("courses", {}), self.world)
-            rejected = Counter({str(reason): int(number) for reason, number in told.get("rejected", {}).items()})
-            frame_end, limited = float(told.get("frame_end", now)), int(told.get("limited", 0))
-        except (TypeError, AttributeError) as error:
-            raise ValueError(f"commands: {error!r}") from None
+        courses, rejected, limited, frame_end = unpack_told(checkpoint.commands, self.world)
         self._unpack_history(checkpoint.history)
-        self.courses.by_tool, self.courses.limited, self.rejected = courses, limited, rejected
-        # The frame rate may be another one now, or the world was stepped by hand.
-        self._frame_end = frame_end if 0.0 < frame_end - now < 1.5 * self.frame else now + self.frame
+        self.courses.by_tool, self.courses.limited = courses, limited
+        self.rejected, self._frame_end = rejected, frame_end
         self.fault, self._due = None, (0.0, 0.0)
 
     def _keep_last(self) -> None:

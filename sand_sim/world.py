@@ -12,7 +12,6 @@ from sand_sim.border import CommandError, Health, Observation, ToolContacts, Too
 from sand_sim.commands import Command, check_command, pose_after
 from sand_sim.contact_reading import observe_tool_contacts
 from sand_sim.engine.explicit_dem import UnstableError
-from sand_sim.engine.state_check import check_layout, check_numbers
 from sand_sim.engine.tools import ToolTrack
 from sand_sim.integrator import VERLET
 from sand_sim.observing import (
@@ -242,15 +241,6 @@ class World:
         if self._observed_wrench is not None:
             state["observed_wrench"] = self._observed_wrench
         return state
-
-    def check_state(self, state: dict[str, np.ndarray]) -> None:
-        """See that arrays of doubtful origin can be a state of this world.
-
-        Raises:
-            StateError: naming the array that cannot.
-        """
-        check_layout(state, self._initial)
-        check_numbers(self.assembly.solver.arrays, state)
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Put a state from ``save`` back."""

@@ -151,6 +151,7 @@ def put(name, value):
         (put("grains.motion", np.nan), "grains.motion"),
         (put("met.order", 10**8), "met.order"),
         (put("tools.travelled", np.inf), "tools.travelled"),
+        (put("swept.shape", 10**6), "swept.shape"),
         (lambda state: state.pop("grains.spin"), "grains.spin"),
         (lambda state: state.update({"grains.place": state["grains.place"][:5]}), "grains.place"),
         (lambda state: state.update({"grains.place": state["grains.place"].astype(float)}), "grains.place"),

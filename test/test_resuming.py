@@ -14,6 +14,8 @@ from sand_sim.simulation import Simulation
 from sand_sim.sinks.run_log import RunLog
 
 MIDDLE = 0.25
+POSE = {"kind": "pose", "tool": "plate", "position": [0, 0, 0.1], "orientation": [0, 0, 0, 1], "time": 1.0}
+TIMES = dict.fromkeys(("last_stamp", "followed_stamp", "last_taken", "promised"))
 
 
 class Running:
@@ -96,7 +98,7 @@ def test_waiting_poses_are_part_of_a_state(scene, uninterrupted, tmp_path):
         assert saved.result(30.0) == path
     checkpoint = read_checkpoint(path)
     assert 0.04 < checkpoint.time < 0.3
-    assert len(checkpoint.commands["courses"]["plate"]) > 3
+    assert len(checkpoint.commands["courses"]["plate"]["waiting"]) > 3
     assert checkpoint.commands["rejected"] == {"not_finite": 1}
     with Running(scene) as running:
         assert running.simulation.load_state(path).result(30.0) == pytest.approx(checkpoint.time)
@@ -114,7 +116,7 @@ def test_a_state_is_loaded_into_the_running_simulation(scene, uninterrupted, tmp
         assert loaded.result(30.0) >= MIDDLE - 1e-6
         running.simulation.reset().result(30.0)
         running.simulation.load_state(path).result(30.0)
-        running.send(scene, running.simulation._pending.promised["plate"], scene.duration)
+        running.send(scene, running.simulation.courses.promised, scene.duration)
         running.wait_until(scene.duration)
         assert_equal(running, uninterrupted)
 
@@ -139,11 +141,16 @@ def test_a_bad_file_changes_nothing_and_is_named(scene, uninterrupted, tmp_path)
 @pytest.mark.parametrize(
     "commands",
     [
-        {"courses": {"spade": [[[0, 0, 0], [0, 0, 0, 1], 1.0]]}},
-        {"courses": {"plate": [[[0, 0, 0], [0, 0, 0, 0], 1.0]]}},
+        {"courses": {"spade": {"waiting": []}}},
+        {"courses": {"plate": {"waiting": []}}},
         {"courses": {"plate": 3}},
-        {"courses": {}, "promised": {"spade": 1.0}, "last_command": {}, "frame_end": 0.0, "limited": 0, "rejected": {}},
-        {"nothing": 1},
+        {"courses": {"plate": TIMES | {"waiting": [POSE | {"orientation": [0, 0, 0, 0]}]}}},
+        {"courses": {"plate": TIMES | {"waiting": [POSE | {"tool": "spade"}]}}},
+        {"courses": {"plate": TIMES | {"waiting": [POSE | {"position": [0, float("nan"), 0]}]}}},
+        {"courses": {"plate": TIMES | {"waiting": [POSE | {"time": None}]}}},
+        {"courses": {"plate": TIMES | {"waiting": [POSE | {"more": 1}]}}},
+        {"courses": {"plate": TIMES | {"promised": "soon", "waiting": []}}},
+        {"rejected": {"late": "often"}},
     ],
 )
 def test_a_strangers_commands_are_refused(scene, tmp_path, commands):
@@ -187,7 +194,7 @@ def test_resumed_after_a_stop_at_any_moment(scene, uninterrupted, tmp_path):
             if k:
                 assert "resumed from" in running.told[0]
                 assert simulation.world.time >= end - 1e-6
-            begin = max(simulation.world.time, simulation._pending.promised.get("plate", 0.0))
+            begin = max(simulation.world.time, simulation.courses.promised)
             running.send(scene, begin, scene.duration)
             running.wait_until(min(0.07 * (k + 1), scene.duration))
             end = simulation.world.time

@@ -28,6 +28,8 @@ def check_layout(state: dict[str, np.ndarray], like: dict[str, np.ndarray]) -> N
         for part in [array[field] for field in array.dtype.names] if array.dtype.names else [array]:
             if part.dtype.kind == "f" and not np.all(np.isfinite(part)):
                 raise StateError(f"array '{name}' has values that are not finite")
+        if name.endswith(".shape") and not np.array_equal(array, like[name]):
+            raise StateError(f"array '{name}' is {array}, {like[name]} is wanted")
 
 
 def check_numbers(arrays: DemArrays, state: dict[str, np.ndarray]) -> None:
