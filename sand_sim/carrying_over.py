@@ -79,22 +79,25 @@ def _rescale(state: dict[str, np.ndarray], share: float, grains: int) -> None:
         state["plungers.states"]["shift"] *= share
 
 
-def describe_changes(assembly: Assembly, loaded: GrainTable) -> dict[str, np.ndarray]:
-    """What has been changed in a world since it was loaded with this table, as plain arrays that belong to its state."""
-    added = {f"added.{name}": getattr(assembly.table, name)[len(loaded) :] for name in _ADDED}
-    tools = [model.tool for model in assembly.tools]
-    scales = np.array([tool.scale for tool in tools], float)
+def describe_changes(assembly: Assembly, loaded: Assembly) -> dict[str, np.ndarray]:
+    """What has been changed in a world since it was loaded, as plain arrays that belong to its state.
+
+    A tool with the mesh it was loaded with has no path, so that states do not depend on where a scene's files are.
+    """
+    added = {f"added.{name}": getattr(assembly.table, name)[len(loaded.table) :] for name in _ADDED}
+    pairs = [(model.tool, first.tool) for model, first in zip(assembly.tools, loaded.tools, strict=True)]
+    paths = ["" if (now.mesh, now.scale) == (first.mesh, first.scale) else now.mesh for now, first in pairs]
     added["lattice.reserve"] = np.array(float(assembly.lattice.reserve))
-    return added | {"mesh.path": np.array([tool.mesh for tool in tools], str), "mesh.scale": scales}
+    return added | {"mesh.path": np.array(paths, str), "mesh.scale": np.array([now.scale for now, _ in pairs], float)}
 
 
-def fit(assembly: Assembly, loaded: GrainTable, models: dict, state: dict[str, np.ndarray]) -> Assembly:
+def fit(assembly: Assembly, loaded: Assembly, models: dict, state: dict[str, np.ndarray]) -> Assembly:
     """A world that a state fits into: the one there is, or one with the grains and tools that the state speaks of.
 
     Args:
         assembly: the world's.
-        loaded: its table as the scene made it.
-        models: tools known, by number, mesh and scale; completed here.
+        loaded: the same as the scene made it.
+        models: tools that others have been exchanged for, by number, mesh and scale; completed here.
         state: from ``World.save``.
 
     Raises:
@@ -103,19 +106,20 @@ def fit(assembly: Assembly, loaded: GrainTable, models: dict, state: dict[str, n
     """
     table, tools = assembly.table, list(assembly.tools)
     wanted = [np.asarray(state.get(f"added.{name}", np.zeros(0))) for name in _ADDED]
-    if not all(np.array_equal(getattr(table, name)[len(loaded) :], rows) for name, rows in zip(_ADDED, wanted, strict=True)):
-        table = GrainTable.join([loaded, _added_rows(assembly, *wanted)])
+    if not all(
+        np.array_equal(getattr(table, name)[len(loaded.table) :], rows) for name, rows in zip(_ADDED, wanted, strict=True)
+    ):
+        table = GrainTable.join([loaded.table, _added_rows(assembly, *wanted)])
     if len(state["grains.place"]) != len(table) or len(state.get("mesh.path", tools)) != len(tools):
         raise ValueError(
             f"state: is of another scene: it has {len(state['grains.place'])} spheres and {len(state.get('mesh.path', tools))} "
-            f"tools, this scene {len(loaded)} spheres, {len(table) - len(loaded)} added later, and {len(tools)} tools"
+            f"tools, this scene {len(loaded.table)} spheres, {len(table) - len(loaded.table)} added later, and {len(tools)} tools"
         )
     for index, (path, scale) in enumerate(zip(state.get("mesh.path", ()), state.get("mesh.scale", ()), strict=True)):
         key = (index, str(path), float(scale))
-        if key != (index, tools[index].tool.mesh, tools[index].tool.scale):
-            if key not in models:
-                models[key] = model_tool(replace(tools[index].tool, mesh=key[1], scale=key[2]), assembly.scene, _silent)
-            tools[index] = models[key]
+        if path and key not in models:
+            models[key] = model_tool(replace(tools[index].tool, mesh=key[1], scale=key[2]), assembly.scene, _silent)
+        tools[index] = models[key] if path else loaded.tools[index]
     reserve = float(state.get("lattice.reserve", assembly.lattice.reserve))
     same = (
         table is assembly.table

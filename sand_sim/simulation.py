@@ -12,15 +12,19 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sand_sim.border import CommandError, Observation
+from sand_sim.checkpoint import Checkpoint, CheckpointError, load_checkpoint, take_checkpoint, write_checkpoint
+from sand_sim.checkpoints import CheckpointFolder
 from sand_sim.commands import Command
 from sand_sim.courses import USUAL, Courses, StampRules
 from sand_sim.engine.explicit_dem import UnstableError
+from sand_sim.pending import pack_told, unpack_told
 from sand_sim.world import World
 
 PACINGS = ("realtime", "fast", "lockstep")
@@ -44,6 +48,9 @@ class Simulation:
         on_fault: called in the stepping thread with the error that stopped it; after ``UnstableError`` a reset brings it back.
         on_reject: called with the error for each rejected command.
         rules: limits on the stamps of commands.
+        checkpoints: where the state is kept from time to time, if anywhere; closed at the end.
+        pack_history: called in the stepping thread for what files of states shall hold besides.
+        unpack_history: called in the stepping thread with that, before the observation of a state that has been loaded.
 
     Attributes:
         courses: where the tools have been told to go.
@@ -62,6 +69,9 @@ class Simulation:
         on_fault: Callable[[Exception], None] = lambda error: None,
         on_reject: Callable[[CommandError], None] = lambda error: None,
         rules: StampRules = USUAL,
+        checkpoints: CheckpointFolder | None = None,
+        pack_history: Callable[[], dict[str, np.ndarray]] = dict,
+        unpack_history: Callable[[dict[str, np.ndarray]], None] = lambda packed: None,
     ):
         self.world, self.pacing, self.real_time_factor = world, pacing, real_time_factor
         self.courses = Courses(world, pacing == "lockstep", rules)
@@ -70,6 +80,8 @@ class Simulation:
         self.last_rejection = ""
         self.step_time = 0.0
         self._on_frame, self._on_fault, self._on_reject = on_frame, on_fault, on_reject
+        self._checkpoints, self._pack_history, self._unpack_history = checkpoints, pack_history, unpack_history
+        self._writer = ThreadPoolExecutor(1, thread_name_prefix="sand_sim state")
         self._wake, self._counting = threading.Condition(), threading.Lock()
         self._inbox: deque[Command] = deque()
         self._requests: deque[tuple[Callable[[], Any], Future]] = deque()
@@ -93,12 +105,17 @@ class Simulation:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the stepping thread after the chunk it is in."""
+        """End the stepping thread after the chunk it is in, and finish files of states."""
         with self._wake:
             self._stopping = True
             self._wake.notify_all()
-        if self._thread.ident is not None and self._thread is not threading.current_thread():
+        if self._thread is threading.current_thread():
+            return
+        if self._thread.ident is not None:
             self._thread.join()
+        self._writer.shutdown()
+        if self._checkpoints:
+            self._checkpoints.close()
 
     def submit(self, command: Command) -> None:
         """Hand a command over; it is checked and carried out, or rejected and counted, before the next step."""
@@ -142,6 +159,35 @@ class Simulation:
         """Go back to time zero and forget all commands; the future is done when the new observation has been shown."""
         return self.request(self._reset)
 
+    def save_state(self, path: Path) -> Future:
+        """Write the state to a file; the future gives the path once it is on the disk, or ``CheckpointError``."""
+        saved: Future = Future()
+
+        def finish(done: Future) -> None:
+            if done.cancelled():
+                saved.cancel()
+            elif error := done.exception():
+                saved.set_exception(error)
+            elif isinstance(result := done.result(), Future):  # the state has been copied and is being written
+                result.add_done_callback(finish)
+            else:
+                saved.set_result(path)
+
+        self.request(lambda: self._writer.submit(write_checkpoint, path, self._checkpoint())).add_done_callback(finish)
+        return saved
+
+    def load_state(self, path: Path) -> Future:
+        """Go on from a file that ``save_state`` or a checkpoint has left, also after a fault.
+
+        The future gives the simulated time [s] when the new observation has been shown, or ``CheckpointError`` for a file that
+        cannot be used; all is as it was then.
+        """
+        return self.request(lambda: self._load(path))
+
+    def resume(self) -> bool:
+        """Go on from the newest good checkpoint, if there is one, as ``CheckpointFolder.resume``; call it before ``start``."""
+        return self._checkpoints.resume(self.world, self._take_over) is not None
+
     def request(self, act: Callable[[], Any]) -> Future:
         """Do something with the world in the stepping thread, between two frames; the future holds what it returns or raises.
 
@@ -177,6 +223,7 @@ class Simulation:
                 self._stopping = True
                 for _, future in self._requests:
                     future.cancel()
+            self._keep_last()
 
     def _take_in(self) -> None:
         """Carry out what has come in from other threads."""
@@ -196,7 +243,7 @@ class Simulation:
             except UnstableError as error:
                 self._fail(error)
                 future.set_exception(error)
-            except RequestError as error:
+            except (RequestError, CheckpointError) as error:
                 future.set_exception(error)
             except Exception as error:
                 future.set_exception(error)
@@ -233,6 +280,8 @@ class Simulation:
             if world.time > self._frame_end - 0.5 * world.time_step:
                 self._frame_end = world.time + self.frame
             self._on_frame(world.observe())
+            if self._checkpoints and self._checkpoints.due(world.steps):
+                self._checkpoints.offer(self._checkpoint())
 
     def _step(self) -> None:
         if self.fault is not None:
@@ -247,3 +296,31 @@ class Simulation:
         self._due = (0.0, 0.0)
         self._frame_end = self.world.time + self.frame
         self._on_frame(self.world.observe())
+
+    def _checkpoint(self) -> Checkpoint:
+        told = pack_told(self.courses, self.rejected, self._frame_end)
+        return take_checkpoint(self.world, told, self._pack_history())
+
+    def _load(self, path: Path) -> float:
+        self._writer.submit(bool).result()  # a state that is still being written may be the one that is asked for
+        load_checkpoint(path, self.world, self._take_over)
+        self._on_frame(self.world.observe())
+        return self.world.time
+
+    def _take_over(self, checkpoint: Checkpoint) -> None:
+        """Go on with the commands and the history of a checkpoint whose state the world has."""
+        courses, rejected, limited, frame_end = unpack_told(checkpoint.commands, self.world)
+        self._unpack_history(checkpoint.history)
+        self.courses.by_tool, self.courses.limited = courses, limited
+        self.rejected, self._frame_end = rejected, frame_end
+        self.fault, self._due = None, (0.0, 0.0)
+
+    def _keep_last(self) -> None:
+        """Keep where the run has been stopped, if that is the end of a frame."""
+        world = self.world
+        if self._checkpoints and self.fault is None and self._checkpoints.due(world.steps, soon=True):
+            if world.time > self._frame_end - 0.5 * world.time_step:
+                self._frame_end = world.time + self.frame
+            elif not world.observed:
+                return
+            self._checkpoints.offer(self._checkpoint())

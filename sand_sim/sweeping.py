@@ -9,6 +9,7 @@ from sand_sim.height_map import footprint_grid, make_height_map
 from sand_sim.tool_model import ToolModel
 
 _FINEST = 0.25  # of a cell, at most a particle's radius: what a middle that grazes a tool may cut off unseen
+_THINNEST = 0.02  # of a cell: how near to a surface that grains touch itself a middle counts as met
 _PARTS = 4  # along the edge of a cell, over which its height is averaged
 
 
@@ -104,7 +105,7 @@ class SweptGround:
         """Mark the cells that a tool passes through as it moves evenly from one pose to another."""
         model, way = self._tools[index], np.asarray(end) - begin
         spin = rotation.to_vector(rotation.multiply(end_turn, rotation.inverse(turn)))
-        angle, radius = float(np.linalg.norm(spin)), model.margin
+        angle, radius = float(np.linalg.norm(spin)), max(model.margin, _THINNEST * self.cell)
         if angle == 0.0 and not way.any():
             return
         cells = self._candidates(index, [(begin, turn), (end, end_turn)], radius + model.extent * angle**2 / 8.0)

@@ -1,6 +1,7 @@
 """A running world: commands in, steps, observations out."""
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -8,11 +9,12 @@ from sand_sim import rotation
 from sand_sim.assemble import Assembly, assemble
 from sand_sim.beforehand import find_coarseness, find_fine_tools, find_overlap
 from sand_sim.border import CommandError, Health, Observation, ToolContacts, ToolPose, ToolVelocity
-from sand_sim.carrying_over import describe_changes, fit
+from sand_sim.carrying_over import describe_changes, expect_layout, fit
 from sand_sim.changing import Changeable
 from sand_sim.commands import Command, check_command, pose_after
 from sand_sim.contact_reading import observe_tool_contacts
 from sand_sim.engine.explicit_dem import ExplicitDem, UnstableError
+from sand_sim.engine.state_check import check_layout, check_numbers
 from sand_sim.engine.tools import ToolTrack
 from sand_sim.integrator import VERLET
 from sand_sim.observing import (
@@ -26,6 +28,7 @@ from sand_sim.observing import (
     start_energy,
 )
 from sand_sim.scene.types import Scene
+from sand_sim.scene_identity import describe_scene
 from sand_sim.settling import settle, strike_off
 from sand_sim.sweeping import SweptGround
 from sand_sim.tool_model import Progress, ToolModel
@@ -65,8 +68,8 @@ class World(Changeable):
         self._observed_steps, self._observed_wrench = 0, tools.wrench.numpy().copy() if tools else None
         spheres, poses = observe_spheres(self.assembly), self._poses
         self._swept = SweptGround(spheres, self.assembly.tools, poses)
-        self._loaded = self.assembly.table
-        self._models = {(k, model.tool.mesh, model.tool.scale): model for k, model in enumerate(self.tools)}
+        self._loaded = replace(self.assembly, solver=None)
+        self._models: dict[tuple[int, str, float], ToolModel] = {}
         self._initial = self.save()
         self.reset()
 
@@ -78,6 +81,21 @@ class World(Changeable):
     def time(self) -> float:
         """Simulated time [s]."""
         return self._solver.steps_done * self.time_step
+
+    @property
+    def steps(self) -> int:
+        """Time steps since time zero."""
+        return self._solver.steps_done
+
+    @property
+    def observed(self) -> bool:
+        """Whether the present state has been observed."""
+        return self._observed_steps == self.steps
+
+    @cached_property
+    def identity(self) -> dict:
+        """What a state must have in common with this world, see ``scene_identity``; read off the scene's files once."""
+        return describe_scene(self._loaded)
 
     @property
     def time_step(self) -> float:
@@ -236,6 +254,16 @@ class World(Changeable):
         if self._observed_wrench is not None:
             state["observed_wrench"] = self._observed_wrench
         return state
+
+    def check_state(self, state: dict[str, np.ndarray]) -> None:
+        """See that a state from a file can be put back: kernels trust the numbers in it as places in memory.
+
+        Raises:
+            ValueError: if it cannot; nothing is changed then.
+        """
+        check_layout(state, expect_layout(self._initial, state))
+        fitting = fit(self.assembly, self._loaded, self._models, state)
+        check_numbers(fitting.solver.arrays, state)
 
     def restore(self, state: dict[str, np.ndarray]) -> None:
         """Put a state from ``save`` back; grains that have been added or removed since, and tools, become what they were.

@@ -27,12 +27,14 @@ def bed():
     return cloud_of(corner * DIAMETER - [0.0, 0.15, 0.1], 0.5 * DIAMETER)
 
 
-@pytest.fixture(scope="module")
-def blade():
+@pytest.fixture(scope="module", params=["rough", "smooth"])
+def blade(request):
     """A thin blade across y whose hull is WIDTH wide and reaches from z = 0 up to HEIGHT."""
-    mesh = trimesh.creation.box((0.001, WIDTH - 2 * PARTICLE, HEIGHT - 2 * PARTICLE))
+    around = 0.0 if request.param == "smooth" else PARTICLE
+    mesh = trimesh.creation.box((0.001 + 2 * (PARTICLE - around), WIDTH - 2 * around, HEIGHT - 2 * around))
     mesh.apply_translation([0.0, 0.0, 0.5 * HEIGHT])
-    return ToolModel(Tool("blade", "", "steel", PARTICLE), mesh, sample_body(mesh, PARTICLE))
+    surface = np.asarray(mesh.triangles) if request.param == "smooth" else None
+    return ToolModel(Tool("blade", "", "steel", PARTICLE, contact=request.param), mesh, sample_body(mesh, PARTICLE), surface)
 
 
 def draw(bed, blade, stops):

@@ -13,6 +13,7 @@ def main(arguments: list[str] | None = None) -> int:
         Exit code: 0 done, 1 refused with one line that says why, 130 interrupted.
     """
     interruption = Interruption()  # before the long imports
+    from sand_sim.checkpoint import CheckpointError
     from sand_sim.cli import bench, demo, pareto, plan, play, run, stability
     from sand_sim.scene.types import SceneError
 
@@ -28,7 +29,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         interruption.check()
         return options.execute(options, interruption)
-    except SceneError as error:
+    except (CheckpointError, SceneError) as error:
         print(f"sand_sim: {error}", file=sys.stderr)
         return 1
     except InterruptedByUserError:

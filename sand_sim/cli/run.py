@@ -2,9 +2,12 @@
 
 import argparse
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from sand_sim.checkpoint import CheckpointError, take_checkpoint
+from sand_sim.checkpoints import PERIOD, CheckpointFolder
 from sand_sim.cli.console import Console
 from sand_sim.config_folder import find_scene
 from sand_sim.engine.explicit_dem import UnstableError
@@ -13,6 +16,7 @@ from sand_sim.playing import commands_at, frame_times
 from sand_sim.report import progress_line, summary_text
 from sand_sim.scene.reading import load_scene
 from sand_sim.sinks.recorder import Recorder, RecordingError
+from sand_sim.sinks.run_log import RunLog
 from sand_sim.world import World
 
 
@@ -22,6 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for recording, history, summary and figure")
     parser.add_argument("--duration", type=float, help="simulated seconds; the scene's own if left out")
     parser.add_argument("--threads", type=int, help="cores to use; all if left out")
+    parser.add_argument("--checkpoint", type=Path, metavar="FOLDER", help="keep the state there, so that a crash loses little")
+    parser.add_argument("--checkpoint-period", type=float, default=PERIOD, metavar="S", help=f"wall seconds, default {PERIOD:g}")
+    parser.add_argument("--resume", action="store_true", help="go on from the newest good checkpoint in that folder")
     parser.add_argument("--view", action="store_true", help="open the Rerun viewer")
     parser.add_argument("--particles", action="store_true", help="draw the particles of tools in Rerun")
 
@@ -37,18 +44,27 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         interruption.check()
         console.stage(stage, share)
 
-    world = World(scene, progress)
-    recording = options.out / f"{scene.name}.rrd"
-    try:
-        recorder = Recorder(world, recording, options.out, options.view, options.particles)
-    except RecordingError as error:
-        console.line(str(error), force=True)
+    def tell(line: str) -> None:
+        console.line(line, force=True)
         console.end()
-        recorder, recording = Recorder(world, output=options.out), None
+
+    checkpoints = None
+    if options.checkpoint:
+        checkpoints = CheckpointFolder(options.checkpoint, scene.name, options.checkpoint_period, tell)
+    elif options.resume:
+        raise CheckpointError("--resume: give the folder to resume from with --checkpoint FOLDER")
+    world = World(scene, progress)
+    log = RunLog(scene)
+    if options.resume:
+        checkpoints.resume(world, lambda checkpoint: log.unpack(checkpoint.history))
+    elif checkpoints and checkpoints.files():
+        tell(f"{options.checkpoint} holds checkpoints of an earlier run, which this one replaces; --resume would go on from them")
+    recorder = _open_recorder(world, log, options, tell)
     recorder.write(world.observe())
     if world.assembly.time_step.warning:
         console.line(f"warning: {world.assembly.time_step.warning}", force=True)
-    for time in frame_times(scene, options.duration):
+    begin = world.time + 0.5 * world.time_step
+    for time in (time for time in frame_times(scene, options.duration) if time > begin):
         for command in commands_at(scene, time):
             world.apply(command)
         try:
@@ -58,13 +74,30 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
             break
         recorder.write(world.observe())
         console.line(progress_line(recorder.log))
+        if checkpoints and checkpoints.due(world.steps):
+            checkpoints.offer(take_checkpoint(world, history=recorder.log.pack()))
         if interruption.asked:
             break
     console.end()
+    if checkpoints:
+        if checkpoints.due(world.steps, soon=True) and not recorder.log.fault:
+            checkpoints.offer(take_checkpoint(world, history=recorder.log.pack()))
+        checkpoints.close()
     files = recorder.close()
     print(f"{scene.name}:\n{summary_text(recorder.log.summarise())}")
-    print("written: " + ", ".join(str(path) for path in [recording, *files] if path))
+    print("written: " + ", ".join(map(str, files)))
     if recorder.log.fault:
         print(f"sand_sim: {recorder.log.fault}", file=sys.stderr)
+    if recorder.log.fault or recorder.failed:
         return 1
     return 130 if interruption.asked else 0
+
+
+def _open_recorder(world: World, log: RunLog, options: argparse.Namespace, tell: Callable[[str], None]) -> Recorder:
+    """The run's recorder; a run that goes on writes a recording of its own beside the one that was broken off."""
+    name = f"{world.scene.name}.from-{world.time:.3f}s" if log.rows else world.scene.name
+    try:
+        return Recorder(world, options.out / f"{name}.rrd", options.out, options.view, options.particles, tell, log)
+    except RecordingError as error:
+        tell(str(error))
+        return Recorder(world, output=options.out, report=tell, log=log)

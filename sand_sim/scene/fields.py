@@ -40,10 +40,10 @@ class Field:
         return Field(self.value.get(key), f"{self.path}.{key}" if self.path else key)
 
     def items(self) -> list[tuple[str, "Field"]]:
-        """Entries of a mapping by name."""
+        """Entries of a mapping by name, in the order of the names: a mapping has no other."""
         if not isinstance(self.value, dict):
             raise self.refuse(f"must be a mapping of names, got {_shown(self.value)}")
-        return [(str(key), self[key]) for key in self.value]
+        return [(str(key), self[key]) for key in sorted(self.value, key=str)]
 
     def entries(self) -> list["Field"]:
         """Entries of a list."""

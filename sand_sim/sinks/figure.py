@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from sand_sim import rotation
-from sand_sim.border import GrainCloud, Observation
 from sand_sim.sinks.colours import colour_by_speed
-from sand_sim.sinks.run_log import RunLog
+from sand_sim.sinks.run_log import RunLog, View
 from sand_sim.tool_model import ToolModel
 
 _VIEWS = 3
@@ -34,22 +33,22 @@ def draw_run(log: RunLog, tools: list[ToolModel], path: Path) -> None:
     left, right = figure.subfigures(1, 2, width_ratios=[1.0, 1.15])
     _draw_curves(left, columns, log)
     axes = np.atleast_1d(right.subplots(len(views), 1))
-    for axis, (_, observation) in zip(axes, views, strict=True):
-        _draw_view(axis, observation, tools)
+    for axis, (_, view) in zip(axes, views, strict=True):
+        _draw_view(axis, view, tools)
     limits = np.array([[axis.get_xlim(), axis.get_ylim()] for axis in axes])
     low, high = limits[..., 0].min(axis=0), limits[..., 1].max(axis=0)
-    for axis, (name, observation) in zip(axes, views, strict=True):
+    for axis, (name, view) in zip(axes, views, strict=True):
         axis.set_xlim(low[0], high[0])
         axis.set_ylim(low[1], high[1])
-        axis.set_title(f"{name}, t = {observation.time:.2f} s", fontsize=9, loc="left")
+        axis.set_title(f"{name}, t = {view.time:.2f} s", fontsize=9, loc="left")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
 
-def _pick_views(log: RunLog) -> list[tuple[str, Observation]]:
-    wanted = [name for name in ("cut", "carry", "dump") if name in log.scenes] or list(log.scenes)[-_VIEWS:]
-    return [(name, log.scenes[name]) for name in wanted] or [("end", log.last)]
+def _pick_views(log: RunLog) -> list[tuple[str, View]]:
+    wanted = [name for name in ("cut", "carry", "dump") if name in log.views] or list(log.views)[-_VIEWS:]
+    return [(name, log.views[name]) for name in wanted] or [("end", View.of(log.last))]
 
 
 def _draw_curves(figure, columns: dict[str, np.ndarray], log: RunLog) -> None:
@@ -80,18 +79,17 @@ def _project(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([x, z * np.cos(_TILT) + y * np.sin(_TILT)], -1), y * np.cos(_TILT) - z * np.sin(_TILT)
 
 
-def _draw_view(axis, observation: Observation, tools: list[ToolModel]) -> None:
+def _draw_view(axis, view: View, tools: list[ToolModel]) -> None:
     """Grains and tool faces behind the plane through the first tool, far ones first."""
     from matplotlib.collections import EllipseCollection, PolyCollection
 
-    cut = observation.tools[0].position[1] if observation.tools else -np.inf
-    grains: GrainCloud = observation.spheres
-    shown = np.flatnonzero(grains.position[:, 1] > cut - grains.radius)
-    spots, depth = _project(grains.position[shown])
-    colours = colour_by_speed(grains.speed[shown], 1.0) / 255.0
+    cut = view.tool_position[0, 1] if len(view.tool_position) else -np.inf
+    shown = np.flatnonzero(view.position[:, 1] > cut - view.radius)
+    spots, depth = _project(view.position[shown])
+    colours = colour_by_speed(view.speed[shown], 1.0) / 255.0
     shade = 0.62 + 0.38 * np.clip(1.0 - (depth - depth.min()) / (np.ptp(depth) or 1.0), 0.0, 1.0)
     items = [(d, "grain", k) for k, d in enumerate(depth)]
-    faces, face_colours = _tool_faces(observation, tools, cut)
+    faces, face_colours = _tool_faces(view, tools, cut)
     items += [(d, "face", k) for k, (d, _) in enumerate(faces)]
     items.sort(key=lambda item: -item[0])
     start = 0
@@ -100,7 +98,7 @@ def _draw_view(axis, observation: Observation, tools: list[ToolModel]) -> None:
             continue
         run = [item[2] for item in items[start:end]]
         if items[start][1] == "grain":
-            size = 2.0 * grains.radius[shown][run]
+            size = 2.0 * view.radius[shown][run]
             centre = spots[run]
             common = {"units": "xy", "offset_transform": axis.transData}
             body = EllipseCollection(size, size, 0, offsets=centre, facecolors=colours[run] * shade[run, None], **common)
@@ -127,13 +125,13 @@ def _draw_view(axis, observation: Observation, tools: list[ToolModel]) -> None:
         axis.spines[side].set_visible(False)
 
 
-def _tool_faces(observation: Observation, tools: list[ToolModel], cut: float):
+def _tool_faces(view: View, tools: list[ToolModel], cut: float):
     """Depth and outline of every tool face behind the cut, and their colours, shape (n, 3)."""
     faces, colours = [], []
-    for report, model in zip(observation.tools, tools, strict=True):
+    for position, turn, model in zip(view.tool_position, view.tool_orientation, tools, strict=True):
         mesh = model.mesh.subdivide_to_size(0.25 * float(np.max(model.mesh.extents)))
-        corners = report.position + rotation.rotate(report.orientation, np.asarray(mesh.vertices))[np.asarray(mesh.faces)]
-        normals = rotation.rotate(report.orientation, np.asarray(mesh.face_normals))
+        corners = position + rotation.rotate(turn, np.asarray(mesh.vertices))[np.asarray(mesh.faces)]
+        normals = rotation.rotate(turn, np.asarray(mesh.face_normals))
         behind = corners[:, :, 1].mean(axis=1) > cut
         outlines, depths = _project(corners[behind])
         bright = 0.55 + 0.45 * np.abs(normals[behind] @ (_LIGHT / np.linalg.norm(_LIGHT)))

@@ -1,5 +1,8 @@
 """Everything a run leaves behind: recording, history, summary and figure."""
 
+import contextlib
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from sand_sim.border import Observation
@@ -14,18 +17,23 @@ class RecordingError(ValueError):
 class Recorder:
     """Writes observations to all sinks that are asked for.
 
+    A sink that fails neither stops nor slows the run: it is reported once, tried again and again, and reported when it is back.
+
     Args:
         world: that is observed.
         recording: Rerun file, None for none.
         output: folder for ``NAME.json``, ``NAME.npz`` and, where matplotlib is installed, ``NAME.png``; None for none.
         view: open the Rerun viewer.
         particles: draw the particles of tools in Rerun.
+        report: called with a line for the user when a sink fails and when it is back.
+        log: history to go on with, a new one if left out.
 
     Raises:
         RecordingError: if a recording or the viewer is asked for and Rerun cannot be imported.
 
     Attributes:
         log: history of the run.
+        failed: files that were asked for and could not be written, or not whole; complete once closed.
     """
 
     def __init__(
@@ -35,48 +43,91 @@ class Recorder:
         output: Path | None = None,
         view: bool = False,
         particles: bool = False,
+        report: Callable[[str], None] = lambda line: print(f"sand_sim: {line}", file=sys.stderr),
+        log: RunLog | None = None,
     ):
-        self.log = RunLog(world.scene)
-        self._world, self._output = world, output
-        self._rerun = None
-        if recording or view:
-            self._rerun = _open_rerun(world, recording, view, particles)
+        self.log = log or RunLog(world.scene)
+        self.failed: list[Path] = []
+        self._world, self._output, self._report = world, output, report
+        self._sinks = _open_sinks(world, recording, view, particles, self.log.identity, report) if recording or view else {}
+        self._troubled: set[str] = set()
+        self._look_after_sinks()
 
     def write(self, observation: Observation) -> None:
         """Add one observation to all sinks; time zero begins a new history."""
         if observation.steps == 0:
-            self.log = RunLog(self._world.scene)
+            self.log = RunLog(self._world.scene, identity=self.log.identity)
         self.log.write(observation)
-        if self._rerun:
-            self._rerun.write(observation)
+        for sink in self._sinks.values():
+            sink.write(observation)
+        self._look_after_sinks()
 
     def close(self) -> list[Path]:
         """Finish all files.
 
         Returns:
-            The files written to ``output``.
+            The files written, as far as they go.
         """
-        if self._rerun:
-            self._rerun.close()
+        files = []
+        for sink in self._sinks.values():
+            sink.close()
+            files += sink.finished
+            if sink.path and (sink.trouble or sink.lost):
+                why = sink.trouble or f"{sink.lost} bytes are missing, more than could wait for the disk"
+                self._report(f"recording {sink.path}: {why}")
+                self.failed.append(sink.path)
+            elif sink.path:
+                files.append(sink.path)
         if self._output is None or self.log.last is None:
-            return []
-        name = self._world.scene.name
-        files = self.log.save(self._output, name)
-        try:
-            from sand_sim.sinks.figure import draw_run
-
-            draw_run(self.log, self._world.tools, self._output / f"{name}.png")
-            files.append(self._output / f"{name}.png")
-        except ModuleNotFoundError:
-            pass  # matplotlib is an extra; the npz holds all that the figure shows
+            return files
+        begin = self._output / self._world.scene.name
+        for ending, write in ((".npz", self.log.save_history), (".json", self.log.save_summary), (".png", self._draw)):
+            path = begin.with_name(begin.name + ending)
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                write(path)
+                files.append(path)
+            except ModuleNotFoundError:
+                pass  # matplotlib is an extra; the npz holds all that the figure shows
+            except OSError as error:
+                self._report(f"{path} cannot be written: {error.strerror or error}")
+                self.failed.append(path)
+                with contextlib.suppress(OSError):
+                    path.unlink(missing_ok=True)  # half a file is worse than none
         return files
 
+    def _draw(self, path: Path) -> None:
+        from sand_sim.sinks.figure import draw_run
 
-def _open_rerun(world: World, recording: Path | None, view: bool, particles: bool):
+        draw_run(self.log, self._world.tools, path)
+
+    def _look_after_sinks(self) -> None:
+        """Report what has begun to fail and what is back."""
+        for name, sink in self._sinks.items():
+            if sink.trouble and name not in self._troubled:
+                self._troubled.add(name)
+                self._report(f"{name}: {sink.trouble}; the simulation goes on, and this is tried again")
+            elif not sink.trouble and name in self._troubled:
+                self._troubled.discard(name)
+                self._report(f"{name} goes on")
+
+
+def _open_sinks(
+    world: World, recording: Path | None, view: bool, particles: bool, identity: str, report: Callable[[str], None]
+) -> dict:
+    """Sinks by the names that they are spoken of."""
     try:
-        from sand_sim.sinks.rerun_sink import RerunSink
+        from sand_sim.sinks.recording_file import RecordingFile
+        from sand_sim.sinks.viewer import Viewer, open_viewer
     except ImportError as error:
         raise RecordingError(
             f"recording: Rerun cannot be imported ({error}); pip install 'sand_sim[recording]', or leave recording and view empty"
         ) from None
-    return RerunSink(world, recording, view, particles)
+    sinks = {}
+    if recording:
+        sinks[f"recording {recording}"] = RecordingFile(recording, world, particles, identity)
+    if view and open_viewer():
+        sinks["the Rerun viewer"] = Viewer(world, particles, identity)
+    elif view:
+        report("the Rerun viewer could not be opened; going on without it")
+    return sinks

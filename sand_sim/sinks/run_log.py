@@ -4,6 +4,7 @@ import json
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from uuid import uuid4
 
 import numpy as np
 
@@ -12,6 +13,40 @@ from sand_sim.scene.types import Scene, Tool
 from sand_sim.track import phases_at, phases_of
 
 _STILL = 1e-4  # [m/s] horizontal speed below which a tool has no draft
+
+
+@dataclass(frozen=True)
+class View:
+    """What is drawn of a moment.
+
+    Attributes:
+        time: simulated [s].
+        position: of all spheres, shape (n, 3) [m].
+        radius: shape (n,) [m].
+        speed: shape (n,) [m/s].
+        tool_position: of the tools' frames, shape (tools, 3) [m].
+        tool_orientation: tool frames to world frame, shape (tools, 4).
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    radius: np.ndarray
+    speed: np.ndarray
+    tool_position: np.ndarray
+    tool_orientation: np.ndarray
+
+    @classmethod
+    def of(cls, observation: Observation) -> "View":
+        """What is drawn of an observation."""
+        spheres, tools = observation.spheres, observation.tools
+        return cls(
+            np.array(observation.time),
+            spheres.position,
+            spheres.radius,
+            spheres.speed,
+            np.array([tool.position for tool in tools]).reshape(-1, 3),
+            np.array([tool.orientation for tool in tools]).reshape(-1, 4),
+        )
 
 
 @dataclass
@@ -23,22 +58,26 @@ class RunLog:
         started: wall clock at the start [s].
         rows: values of each frame by name.
         last: the last observation.
-        scenes: the observation at the end of each phase of a trajectory, by the phase's name.
+        views: the bed at the end of each phase of a trajectory, by the phase's name.
         fault: why the run stopped before its end, empty if it did not.
+        identity: the same before and after a run has been resumed.
     """
 
     scene: Scene
     started: float = field(default_factory=time.monotonic)
     rows: list[dict] = field(default_factory=list)
     last: Observation | None = None
-    scenes: dict[str, Observation] = field(default_factory=dict)
+    views: dict[str, View] = field(default_factory=dict)
     fault: str = ""
+    identity: str = field(default_factory=lambda: uuid4().hex)
 
     def write(self, observation: Observation) -> None:
-        """Add one observation."""
-        health = observation.health
+        """Add one observation; a moment that is there already, before a checkpoint, is not added again."""
+        health, self.last = observation.health, observation
+        if self.rows and self.rows[-1]["steps"] == observation.steps:
+            return
         for phase in phases_at(self.scene, observation.time):
-            self.scenes[phase] = observation
+            self.views[phase] = View.of(observation)
         row = {
             "time": observation.time,
             "wall": time.monotonic() - self.started,
@@ -59,7 +98,14 @@ class RunLog:
             if wall.name in self._plungers:
                 row[f"wall.{wall.name}.position"], row[f"wall.{wall.name}.force"] = wall.position, wall.force
         self.rows.append(row)
-        self.last = observation
+
+    @property
+    def _names(self) -> set[str]:
+        """Of all columns."""
+        names = {"time", "wall", "steps", "contacts", "deepest", "kinetic", "dissipated", "momentum_residual"}
+        parts = ("position", "velocity", "force", "torque", "carried")
+        names |= {f"{tool.name}.{part}" for tool in self.scene.tools for part in parts}
+        return names | {f"wall.{name}.{part}" for name in self._plungers for part in ("position", "force")}
 
     @property
     def _plungers(self) -> set[str]:
@@ -73,6 +119,36 @@ class RunLog:
     def columns(self) -> dict[str, np.ndarray]:
         """All rows as arrays: times, shape (frames,), and vectors, shape (frames, 3)."""
         return {name: np.array([row[name] for row in self.rows]) for name in (self.rows[0] if self.rows else ())}
+
+    def pack(self) -> dict[str, np.ndarray]:
+        """All but the last observation as plain arrays, for a checkpoint."""
+        views = {phase: vars(view).items() for phase, view in self.views.items()}
+        packed = {"identity": np.array(self.identity)} | {f"row/{name}": column for name, column in self.columns().items()}
+        return packed | {f"view/{phase}/{name}": array for phase, items in views.items() for name, array in items}
+
+    def unpack(self, packed: dict[str, np.ndarray]) -> None:
+        """Go on from what ``pack`` gave, as if no time had passed meanwhile.
+
+        Raises:
+            ValueError: if that was another run's.
+        """
+        columns, views = {}, {}
+        for name, array in packed.items():
+            kind, _, name_there = name.partition("/")
+            if kind == "row":
+                columns[name_there] = array
+            elif kind == "view":
+                phase, _, part = name_there.rpartition("/")
+                views.setdefault(phase, {})[part] = array
+        if packed and columns.keys() != self._names:
+            raise ValueError("history: not of this scene")
+        try:
+            rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+            self.views, self.rows = {phase: View(**parts) for phase, parts in views.items()}, rows
+        except TypeError as error:
+            raise ValueError(f"history: {error}") from None
+        self.identity = str(packed.get("identity", self.identity))
+        self.started = time.monotonic() - (float(rows[-1]["wall"]) if rows else 0.0)
 
     def summarise(self) -> dict:
         """What a run comes down to, SI units."""
@@ -97,14 +173,14 @@ class RunLog:
         }
         return json.loads(json.dumps(summary, default=float))
 
-    def save(self, folder: Path, name: str) -> list[Path]:
-        """Write ``name.npz`` (all columns, the last bed) and ``name.json`` (the summary) to a folder; return their paths."""
-        folder.mkdir(parents=True, exist_ok=True)
+    def save_history(self, path: Path) -> None:
+        """Write all columns and the last bed to an npz file."""
         grains = {f"bed.{key}": value for key, value in asdict(self.last.grains).items()}
-        history, summary = folder / f"{name}.npz", folder / f"{name}.json"
-        np.savez_compressed(history, **self.columns(), **grains)
-        summary.write_text(json.dumps(self.summarise(), indent=2) + "\n")
-        return [history, summary]
+        np.savez_compressed(path, **self.columns(), **grains)
+
+    def save_summary(self, path: Path) -> None:
+        """Write the summary to a JSON file."""
+        path.write_text(json.dumps(self.summarise(), indent=2) + "\n")
 
 
 def _summarise_tool(columns: dict[str, np.ndarray], tool: Tool) -> dict:

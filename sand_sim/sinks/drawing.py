@@ -1,8 +1,4 @@
-"""Recordings for Rerun: grains, tools, wrenches and health on simulated time."""
-
-import contextlib
-import sys
-from pathlib import Path
+"""What Rerun shows of a world: grains, tools, wrenches and health on simulated time."""
 
 import numpy as np
 import rerun as rr
@@ -11,40 +7,28 @@ import trimesh
 
 from sand_sim.border import Observation
 from sand_sim.sinks.colours import colour_by_speed
-from sand_sim.sinks.viewer import open_viewer
 from sand_sim.sinks.wall_mesh import shell_mesh
 from sand_sim.world import World
 
 _TIMELINE = "sim_time"
 _AXES = "xyz"
-_LONGEST_FLUSH = 20.0  # [s]
 
 
-class RerunSink:
-    """Writes observations to a recording file, to a viewer, or to both.
+class Drawing:
+    """Draws observations on a stream of Rerun.
 
     Args:
-        world: whose walls and tools are drawn.
-        path: of the .rrd file; its folder is made. None for no file.
-        view: open the viewer.
+        world: whose walls and tools are drawn, at once.
+        stream: to draw on.
         particles: also draw the particles of the tools.
     """
 
-    def __init__(self, world: World, path: Path | None, view: bool = False, particles: bool = False):
+    def __init__(self, world: World, stream: rr.RecordingStream, particles: bool = False):
         self._fastest = max((tool.max_speed for tool in world.scene.tools), default=1.0)
         self._identity = np.zeros(0, int)
         self._plungers = {wall.name for wall in world.assembly.walls if wall.drive}
-        self._recording = rr.RecordingStream("sand_sim", recording_id=None)
-        sinks = []
-        if path is not None:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            sinks.append(rr.FileSink(str(path)))
-        viewer = open_viewer() if view else None
-        if viewer:
-            sinks.append(rr.GrpcSink(viewer))
-        elif view:
-            print("sand_sim: the Rerun viewer could not be opened; going on without it", file=sys.stderr)
-        self._recording.set_sinks(*sinks, default_blueprint=_blueprint(world))
+        self._recording = stream
+        stream.send_blueprint(_blueprint(world), make_active=False, make_default=True)
         self._draw_still(world, particles)
 
     def write(self, observation: Observation) -> None:
@@ -81,12 +65,6 @@ class RerunSink:
         }
         for name, value in shown.items():
             recording.log(f"health/{name}", rr.Scalars(value))
-
-    def close(self) -> None:
-        """Write out what is pending, as far as a viewer that may be gone allows."""
-        with contextlib.suppress(RuntimeError):
-            self._recording.flush(timeout_sec=_LONGEST_FLUSH)
-        self._recording.disconnect()
 
     def _draw_still(self, world: World, particles: bool) -> None:
         """Draw what never changes: axes, walls, tool meshes and particles."""

@@ -1,0 +1,220 @@
+"""Sinks that fail: the run goes on, says so once, and takes them up again."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from scenes import write_small_scene
+
+from sand_sim import World, load_scene
+from sand_sim.sinks.recorder import Recorder
+
+pytest.importorskip("rerun")
+
+PORT = 9887
+FULL = OSError(28, "No space left on device")
+
+
+@pytest.fixture
+def world(tmp_path):
+    return World(load_scene(write_small_scene(tmp_path)))
+
+
+@pytest.fixture(autouse=True)
+def no_waiting(monkeypatch):
+    """Every frame is written and looked after."""
+    monkeypatch.setattr("sand_sim.sinks.recording_file._RETRY", 0.02)
+    monkeypatch.setattr("sand_sim.sinks.viewer._EVERY", 0.0)
+
+
+def frames(recorder, world, number):
+    for _ in range(number):
+        world.step(100)
+        recorder.write(world.observe())
+
+
+def frames_until(recorder, world, condition):
+    """Go on until something has come of it; how many frames it took."""
+    begin, number = time.monotonic(), 0
+    while not condition():
+        assert time.monotonic() - begin < 20.0
+        frames(recorder, world, 1)
+        time.sleep(0.01)
+        number += 1
+    return number
+
+
+def is_sound(path):
+    """Whether Rerun finds nothing wrong with a recording."""
+    return (
+        subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", path], capture_output=True, check=False).returncode == 0
+    )
+
+
+def times_in(path):
+    """Moments that a recording holds grains of."""
+    printed = subprocess.run(
+        [sys.executable, "-m", "rerun", "rrd", "print", "-v", path], capture_output=True, text=True, check=True
+    ).stdout
+    return sum(
+        int(line.split(" with ")[1].split()[0]) for line in printed.splitlines() if "/world/grains" in line and " with " in line
+    )
+
+
+def test_a_recording_holds_each_frame(world, tmp_path):
+    recorder = Recorder(world, tmp_path / "run.rrd")
+    frames(recorder, world, 7)
+    assert recorder.close() == [tmp_path / "run.rrd"]
+    assert times_in(tmp_path / "run.rrd") == 7 + 1, "and the radii, which are drawn once"
+    assert is_sound(tmp_path / "run.rrd")
+
+
+def test_a_full_disk_is_told_once_and_nothing_is_lost(world, tmp_path, monkeypatch):
+    told = []
+    recorder = Recorder(world, tmp_path / "run.rrd", report=told.append)
+    frames(recorder, world, 3)
+    with monkeypatch.context() as patch:
+        patch.setattr("sand_sim.sinks.recording_file._Pump._append", fail)
+        number = frames_until(recorder, world, lambda: told)
+        frames(recorder, world, 5)
+    number += frames_until(recorder, world, lambda: len(told) > 1)
+    recorder.close()
+    assert len(told) == 2
+    assert "No space left on device; the simulation goes on" in told[0]
+    assert told[1].endswith("goes on")
+    assert recorder.failed == []
+    assert times_in(tmp_path / "run.rrd") == 3 + 5 + number + 1
+    assert is_sound(tmp_path / "run.rrd")
+
+
+def fail(*_):
+    raise FULL
+
+
+def test_a_disk_that_is_full_in_the_middle_of_a_write(world, tmp_path):
+    """A limit on the size of files plays the disk."""
+    told = []
+    recorder = Recorder(world, tmp_path / "run.rrd", report=told.append)
+    frames(recorder, world, 3)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50_001, before[1]))
+    try:
+        number = frames_until(recorder, world, lambda: told)
+        assert (tmp_path / "run.rrd").stat().st_size == 50_001
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, ignored)
+    number += frames_until(recorder, world, lambda: len(told) > 1)
+    recorder.close()
+    assert len(told) == 2
+    assert "File too large" in told[0]
+    assert times_in(tmp_path / "run.rrd") == 3 + number + 1
+    assert is_sound(tmp_path / "run.rrd")
+
+
+def test_what_waits_for_a_disk_has_a_bound(world, tmp_path, monkeypatch):
+    """Beyond it frames are missing, and the recording goes on in a second file when there is room again."""
+    told = []
+    monkeypatch.setattr("sand_sim.sinks.recording_file._MOST_WAITING", 100_000)
+    recorder = Recorder(world, tmp_path / "run.rrd", report=told.append)
+    with monkeypatch.context() as patch:
+        patch.setattr("sand_sim.sinks.recording_file._Pump._append", fail)
+        pump = next(iter(recorder._sinks.values()))._pump
+        frames_until(recorder, world, lambda: pump.lost)
+    frames_until(recorder, world, lambda: len(told) > 1)
+    frames(recorder, world, 3)
+    assert recorder.close() == [tmp_path / "run.rrd"]
+    assert recorder.failed == [tmp_path / "run.2.rrd"]
+    assert "bytes are missing" in told[-1]
+    assert times_in(tmp_path / "run.2.rrd") >= 3
+    assert is_sound(tmp_path / "run.2.rrd")
+
+
+def test_a_deleted_recording_is_begun_again(world, tmp_path):
+    path = tmp_path / "sub" / "run.rrd"
+    recorder = Recorder(world, path)
+    frames_until(recorder, world, path.exists)
+    path.unlink()
+    frames_until(recorder, world, path.exists)
+    frames(recorder, world, 3)
+    assert recorder.close() == [path]
+    assert times_in(path) >= 4
+    assert is_sound(path)
+
+
+def test_a_folder_that_cannot_be_written(world, tmp_path):
+    """A file stands where the folder shall be; it goes away before the end."""
+    told, blocked = [], tmp_path / "out"
+    blocked.touch()
+    recorder = Recorder(world, blocked / "run.rrd", blocked, report=told.append)
+    number = frames_until(recorder, world, lambda: told)
+    frames(recorder, world, 3)
+    assert len(told) == 1
+    assert "File exists" in told[0]
+    blocked.unlink()
+    number += 3 + frames_until(recorder, world, lambda: len(told) > 1)
+    assert len(recorder.close()) >= 3
+    assert recorder.failed == []
+    assert times_in(blocked / "run.rrd") == number + 1
+    with np.load(blocked / "small.npz") as history:
+        assert len(history["time"]) == number
+
+
+def test_files_that_cannot_be_written_at_the_end_are_named(world, tmp_path):
+    told, blocked = [], tmp_path / "out"
+    blocked.touch()
+    recorder = Recorder(world, blocked / "run.rrd", blocked, report=told.append)
+    frames(recorder, world, 3)
+    assert recorder.close() == []
+    assert {path.name for path in recorder.failed} == {"run.rrd", "small.npz", "small.json", "small.png"}
+    assert all(any(path.name in line for line in told) for path in recorder.failed)
+
+
+def listener():
+    """A program that viewers connect to, in place of a viewer."""
+    command = [sys.executable, "-m", "rerun", "--serve-grpc", "--bind", "127.0.0.1", "--port", str(PORT)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    from sand_sim.sinks.viewer import _listens
+
+    begin = time.monotonic()
+    while not _listens(PORT):
+        assert time.monotonic() - begin < 60.0
+        time.sleep(0.1)
+    return process
+
+
+def end(process):
+    os.killpg(process.pid, 9)
+    process.wait()
+
+
+@pytest.mark.xdist_group("processes")
+def test_a_viewer_may_be_killed_and_come_back(world, monkeypatch):
+    monkeypatch.setattr("sand_sim.sinks.viewer.open_viewer", lambda: True)
+    monkeypatch.setattr("sand_sim.sinks.viewer.Viewer.__init__.__defaults__", (PORT,))
+    told, viewer = [], listener()
+    try:
+        recorder = Recorder(world, view=True, report=told.append)
+        frames(recorder, world, 5)
+        assert told == []
+        end(viewer)
+        begin = time.monotonic()
+        frames(recorder, world, 50)
+        assert time.monotonic() - begin < 20.0, "the run does not wait for it"
+        assert told == [f"the Rerun viewer: nobody listens on 127.0.0.1:{PORT}; the simulation goes on, and this is tried again"]
+        viewer = listener()
+        frames(recorder, world, 5)
+        assert told[1:] == ["the Rerun viewer goes on"]
+        begin = time.monotonic()
+        end(viewer)
+        recorder.close()
+        assert time.monotonic() - begin < 25.0
+    finally:
+        if viewer.poll() is None:
+            end(viewer)
