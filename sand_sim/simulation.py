@@ -33,10 +33,6 @@ _NAP = 0.05  # [s]
 _MOST_UNREAD = 10_000
 
 
-class RequestError(ValueError):
-    """A request that was refused; the world is as before."""
-
-
 class Simulation:
     """Runs a world in a thread of its own.
 
@@ -159,6 +155,16 @@ class Simulation:
         """Go back to time zero and forget all commands; the future is done when the new observation has been shown."""
         return self.request(self._reset)
 
+    def change(self, act: Callable[[], Any]) -> Future:
+        """As ``request``, and the world is shown when it has been changed."""
+
+        def act_and_show() -> Any:
+            result = act()
+            self._on_frame(self.world.observe())
+            return result
+
+        return self.request(act_and_show)
+
     def save_state(self, path: Path) -> Future:
         """Write the state to a file; the future gives the path once it is on the disk, or ``CheckpointError``."""
         saved: Future = Future()
@@ -191,7 +197,7 @@ class Simulation:
     def request(self, act: Callable[[], Any]) -> Future:
         """Do something with the world in the stepping thread, between two frames; the future holds what it returns or raises.
 
-        It may raise ``RequestError`` if it has changed nothing; any other error stops the stepping.
+        It may raise ``CommandError`` or ``CheckpointError`` if it has changed nothing; any other error stops the stepping.
         """
         future: Future = Future()
         with self._wake:
@@ -243,7 +249,7 @@ class Simulation:
             except UnstableError as error:
                 self._fail(error)
                 future.set_exception(error)
-            except (RequestError, CheckpointError) as error:
+            except (CommandError, CheckpointError) as error:
                 future.set_exception(error)
             except Exception as error:
                 future.set_exception(error)
