@@ -50,21 +50,21 @@ def allowed_mesh(uri: str, roots: Sequence[Path], packages: bool) -> Path:
     shown = uri if len(uri) <= _SHOWN else uri[: _SHOWN // 2] + "..." + uri[-_SHOWN // 2 :]
     shown = "".join(letter if letter.isprintable() else "?" for letter in shown)
     try:
-        inside = [real for real, allowed in _found(uri, roots, packages) if allowed]
-        existing = [real for real in inside if real.is_file()]
+        found = list(_found(uri, roots, packages))
+        existing = [real for real, allowed in found if allowed and real.is_file()]
     except OSError as error:
         raise SceneError(f"mesh '{shown}': cannot be read: {error.strerror}") from None
     except (MeshError, RuntimeError, ValueError) as error:  # a circle of links is a RuntimeError
         raise SceneError(f"mesh '{shown}': {error}") from None
-    if not inside:
+    if existing:
+        return existing[0]
+    if not (found and all(allowed for _, allowed in found)):
         allowed = ", ".join([*map(str, roots), *(["the share folders of ROS packages"] if packages else [])]) or "none"
         raise SceneError(
             f"mesh '{shown}': lies outside the folders that meshes may come from ({allowed}); use package://, "
             "or name its folder in the parameter mesh_roots"
         )
-    if not existing:
-        raise SceneError(f"mesh '{shown}': there is no file {' or '.join(map(str, inside))}")
-    return existing[0]
+    raise SceneError(f"mesh '{shown}': there is no file {' or '.join(str(real) for real, _ in found)}")
 
 
 def _found(uri: str, roots: Sequence[Path], packages: bool) -> Iterator[tuple[Path, bool]]:

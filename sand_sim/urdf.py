@@ -159,13 +159,15 @@ def shown(name: str) -> str:
 
 def _parse(content: str | bytes) -> ElementTree.Element:
     """The outermost element; the text between elements, of which URDF has none, is dropped."""
+    declared = None
     try:
-        content = content.encode() if isinstance(content, str) else content
+        if isinstance(content, str):  # whatever encoding it declares
+            content, declared = content.encode(), "utf-8"
     except UnicodeEncodeError:
         raise SceneError("is not valid XML: it holds letters that are none") from None
     if len(content) > _LARGEST:
         raise SceneError(f"is larger than {_LARGEST // 10**6} MB")
-    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate(declared)
     number = depth = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:

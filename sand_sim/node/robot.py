@@ -4,9 +4,11 @@ import time
 from collections.abc import Callable
 
 import rclpy
+from rclpy.exceptions import NameValidationException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import String
 
 from sand_sim.scene.types import SceneError
@@ -49,11 +51,14 @@ def read_robot(node, progress: Callable[[str, float], None]) -> tuple[str, Robot
 
 
 def _wait_for_description(node, progress: Callable[[str, float], None]) -> str:
-    parameters = node.parameters
+    parameters, name = node.parameters, node.parameters["robot_description_topic"]
     if parameters["robot_description"]:
         raise ValueError("parameter robot_description_topic: give either this one or robot_description, not both")
-    topic = node.resolve_topic_name(parameters["robot_description_topic"])
-    patience = parameters["robot_description_timeout"]
+    try:
+        validate_topic_name(name)
+    except NameValidationException as error:
+        raise ValueError(f"parameter robot_description_topic: {' '.join(str(error).split())}") from None
+    topic, patience = node.resolve_topic_name(name), parameters["robot_description_timeout"]
     node.get_logger().info(f"waiting up to {patience:g} s for the robot description on {topic}")
     heard = _hear(node, topic, patience, progress)
     if not heard:
