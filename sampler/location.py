@@ -57,6 +57,8 @@ def package_share(package: str) -> Path:
     Raises:
         MeshError: if there is no such package.
     """
+    if not package:
+        raise MeshError("names no package; write package://NAME/path, with two slashes")
     if re.fullmatch(r"\w[\w-]*", package, re.ASCII):
         for prefix in package_prefixes():
             share = prefix / "share" / package

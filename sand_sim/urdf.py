@@ -141,6 +141,8 @@ def parse_robot(content: str | bytes) -> Robot:
         if child in joints:
             raise SceneError(f"link '{shown(child)}' hangs on two joints")
         joints[child] = joint
+    if not links:
+        raise SceneError("has no links")
     roots = [name for name in links if name not in joints]
     if len(roots) != 1:
         named = f": {', '.join(map(shown, roots[:10]))}" if roots else ""

@@ -90,7 +90,7 @@ OUTSIDE = "lies outside the folders that meshes may come from"
         ("pipe.stl", "there is no file"),
         ("circle", "loop"),
         ("package://../outside/secret.stl", "no ROS package '..'"),
-        ("package:///digger/meshes/tool.stl", "no ROS package ''"),
+        ("package:///digger/meshes/tool.stl", "names no package; write package://NAME/path, with two slashes"),
         ("package://no_such/a.stl", "no ROS package 'no_such'"),
         ("package://numpy/__init__.py", "no ROS package 'numpy'"),
         ("package://os.path/a.stl", "no ROS package 'os.path'"),
