@@ -60,9 +60,10 @@ def allowed_mesh(uri: str, roots: Sequence[Path], packages: bool) -> Path:
         return existing[0]
     if not (found and all(allowed for _, allowed in found)):
         allowed = ", ".join([*map(str, roots), *(["the share folders of ROS packages"] if packages else [])]) or "none"
+        hint = "use package://, or name" if packages else "name"
         raise SceneError(
-            f"mesh '{shown}': lies outside the folders that meshes may come from ({allowed}); use package://, "
-            "or name its folder in the parameter mesh_roots"
+            f"mesh '{shown}': lies outside the folders that meshes may come from ({allowed}); {hint} its folder in the parameter "
+            "mesh_roots"
         )
     raise SceneError(f"mesh '{shown}': there is no file {' or '.join(str(real) for real, _ in found)}")
 
