@@ -4,7 +4,11 @@ import contextlib
 import hashlib
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
+
+import numpy as np
+import trimesh
 
 from sampler.body import ParticleBody
 from sampler.errors import MeshError
@@ -35,11 +39,34 @@ def sample_file(path: str | Path, radius: float, scale: float = 1.0, *, cache: b
         MeshError: as ``read_mesh`` and ``sample_body`` do.
     """
     path = Path(path)
-    place = cache_folder() / f"{_key(path, radius=radius, scale=scale, **options)}.npz" if cache and path.is_file() else None
+    content = path.suffix.lower().encode() + path.read_bytes() if cache and path.is_file() else None
+    return _keep(content, lambda: read_mesh(path, scale), {"radius": radius, "scale": scale} | options)
+
+
+def sample_mesh(mesh: trimesh.Trimesh, radius: float, *, cache: bool = True, **options) -> ParticleBody:
+    """Sample a mesh, or take what an earlier call with the same triangles and options has kept.
+
+    Args:
+        mesh: in metres.
+        radius: of every particle [m].
+        cache: whether to look for and keep the body.
+        options: further ones of ``sample_body``.
+
+    Raises:
+        MeshError: as ``sample_body`` does.
+    """
+    arrays = (np.asarray(mesh.vertices, "<f8"), np.asarray(mesh.faces, "<i8"))
+    content = b"".join(repr(array.shape).encode() + array.tobytes() for array in arrays) if cache else None
+    return _keep(content, lambda: mesh, {"radius": radius} | options)
+
+
+def _keep(content: bytes | None, read: Callable[[], trimesh.Trimesh], options: dict) -> ParticleBody:
+    """The body kept under the content, if there is one, else a new one, kept if there is a content."""
+    place = None if content is None else cache_folder() / f"{_key(content, options)}.npz"
     if place:
         with contextlib.suppress(MeshError):  # missing or damaged: sampled anew
             return load_body(place)
-    body = sample_body(read_mesh(path, scale), radius, **options)
+    body = sample_body(read(), **{name: value for name, value in options.items() if name != "scale"})
     if place:
         with contextlib.suppress(MeshError):  # a folder that cannot be written only costs time
             save_body(place, body)
@@ -47,13 +74,13 @@ def sample_file(path: str | Path, radius: float, scale: float = 1.0, *, cache: b
     return body
 
 
-def _key(path: Path, **options) -> str:
+def _key(content: bytes, options: dict) -> str:
     digest = hashlib.sha256()
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.read_bytes())
     shown = {name: value for name, value in options.items() if name not in ("progress", "observe") and value is not None}
-    digest.update(repr(sorted(shown.items())).encode() + path.suffix.lower().encode())
-    digest.update(path.read_bytes())
+    digest.update(repr(sorted(shown.items())).encode())
+    digest.update(content)
     return digest.hexdigest()
 
 

@@ -1,19 +1,22 @@
 """Where a mesh lies: plain paths, ``file://`` and ``package://`` addresses as robot descriptions use them."""
 
 import os
-from importlib import resources
+import re
+import sys
+from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
 from sampler.errors import MeshError
 
 
-def locate_mesh(address: str, folder: Path | None = None) -> Path:
-    """Turn the address of a mesh into a path.
+def locate_mesh(address: str, folder: Path | None = None, kind: str = "mesh") -> Path:
+    """Turn the address of a mesh, or of another file of a robot, into a path.
 
     Args:
         address: a path, ``file:///path`` or ``package://NAME/path``.
         folder: where relative paths start; the working folder if None.
+        kind: what the file is called in messages.
 
     Returns:
         The path of an existing file.
@@ -23,30 +26,51 @@ def locate_mesh(address: str, folder: Path | None = None) -> Path:
     """
     parts = urlparse(address)
     if parts.scheme == "package":
-        path = _package_share(parts.netloc, address) / unquote(parts.path).lstrip("/")
+        try:
+            share = package_share(parts.netloc)
+        except MeshError as error:
+            raise MeshError(f"{kind} '{address}': {error}") from None
+        path = share / unquote(parts.path).lstrip("/")
     elif parts.scheme == "file":
         path = Path(unquote(parts.path))
     elif parts.scheme == "" or len(parts.scheme) == 1:
         path = Path(address).expanduser()
         path = path if path.is_absolute() else (folder or Path.cwd()) / path
     else:
-        raise MeshError(f"mesh '{address}': unknown scheme '{parts.scheme}://'; use package://, file:// or a path")
+        raise MeshError(f"{kind} '{address}': unknown scheme '{parts.scheme}://'; use package://, file:// or a path")
     if not path.is_file():
-        raise MeshError(f"mesh '{address}': there is no file {path}")
+        raise MeshError(f"{kind} '{address}': there is no file {path}")
     return path
 
 
-def _package_share(package: str, address: str) -> Path:
-    """Share folder of a ROS package: by the ament index where ROS is installed, else by its Python package's source tree."""
-    for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
-        share = Path(prefix) / "share" / package
-        if prefix and share.is_dir():
-            return share
-    try:
-        root = Path(str(resources.files(package)))
-    except (ModuleNotFoundError, TypeError, ValueError):
-        raise MeshError(
-            f"mesh '{address}': no ROS package '{package}' in AMENT_PREFIX_PATH; source its workspace or give a path"
-        ) from None
-    installed = root / "share"
-    return installed if installed.is_dir() else root.parent
+def package_prefixes() -> list[Path]:
+    """Folders whose ``share`` holds ROS packages: those of the environment, then that of this Python."""
+    given = [Path(prefix) for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if prefix]
+    return [*given, Path(sys.prefix)]
+
+
+def package_share(package: str) -> Path:
+    """Share folder of a ROS package: by the ament index where ROS is installed, else by its Python package's source tree.
+
+    Nothing of the package is imported, because its name may come from a stranger.
+
+    Raises:
+        MeshError: if there is no such package.
+    """
+    if not package:
+        raise MeshError("names no package; write package://NAME/path, with two slashes")
+    if re.fullmatch(r"\w[\w-]*", package, re.ASCII):
+        for prefix in package_prefixes():
+            share = prefix / "share" / package
+            if (share / "package.xml").is_file() or (share.is_dir() and prefix != Path(sys.prefix)):
+                return share
+        try:
+            spec = find_spec(package)
+        except ValueError:  # a module without one
+            spec = None
+        root = Path(spec.origin).parent if spec and spec.origin and spec.submodule_search_locations else None
+        if root and (root / "share").is_dir():
+            return root / "share"
+        if root and (root.parent / "package.xml").is_file():
+            return root.parent
+    raise MeshError(f"no ROS package '{package}' in AMENT_PREFIX_PATH; source its workspace or give a path")

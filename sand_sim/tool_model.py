@@ -7,9 +7,10 @@ from functools import partial
 import numpy as np
 import trimesh
 
-from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_file
+from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_mesh
 from sampler.surface import Surface
 from sand_sim import rotation
+from sand_sim.link_mesh import model_link
 from sand_sim.scene.shapes import shape_named
 from sand_sim.scene.types import SMOOTH, Scene, SceneError, Tool
 
@@ -83,14 +84,13 @@ def model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
         SceneError: if the mesh cannot be used.
     """
     try:
-        path = locate_mesh(tool.mesh, scene.folder)
-        mesh = read_mesh(path, tool.scale)
+        mesh = model_link(tool, scene) if tool.link else read_mesh(locate_mesh(tool.mesh, scene.folder), tool.scale)
         show = partial(progress, f"sampling {tool.name}")
         grain, spacing = None if tool.contact == SMOOTH else _smallest_grain(scene), tool.particle_spacing
         options = {"grain": grain, "spacing": spacing, "thickness": tool.thickness}
-        body = sample_file(path, tool.particle_radius, tool.scale, progress=show, **options)
+        body = sample_mesh(mesh, tool.particle_radius, progress=show, **options)
     except MeshError as error:
-        raise SceneError(f"tools.{tool.name}.mesh: {error}") from None
+        raise SceneError(f"tools.{tool.name}.{'link' if tool.link else 'mesh'}: {error}") from None
     return ToolModel(tool, mesh, body, outward_triangles(body.triangles) if tool.contact == SMOOTH else None)
 
 

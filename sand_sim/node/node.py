@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Clock
 
 from msg_adapters import tf2_msgs
 from msg_adapters.builtin_interfaces import time_to_stamp
-from sand_sim.border import Observation
+from sand_sim.border import Frame, Observation
 from sand_sim.config_folder import find_scene
 from sand_sim.courses import StampRules
 from sand_sim.engine.explicit_dem import UnstableError
@@ -20,6 +20,7 @@ from sand_sim.node.bed_outputs import BedOutputs
 from sand_sim.node.connections import Connections
 from sand_sim.node.diagnosis import Diagnosis
 from sand_sim.node.parameters import Parameters, tool_declarations
+from sand_sim.node.robot import read_robot
 from sand_sim.node.services import Services
 from sand_sim.node.tool_inputs import ToolInputs
 from sand_sim.node.tool_outputs import ToolOutputs
@@ -152,7 +153,9 @@ class SandSimNode(LifecycleNode):
         if parameters["threads"]:
             scene = replace(scene, solver=replace(scene.solver, threads=parameters["threads"]))
         for tool in scene.tools:
-            parameters.declare(tool_declarations(tool.name))
+            parameters.declare(tool_declarations(tool.name, tool.link))
+        description, robot = read_robot(self, self._progress)
+        scene = replace(scene, robot_description=description, mesh_roots=tuple(parameters["mesh_roots"]))
         world = World(scene, self._progress)
         paths = (Path(parameters[name]).expanduser() if parameters[name] else None for name in ("recording", "output"))
         self.recorder = Recorder(world, *paths, parameters["view"], parameters["particles"])
@@ -168,7 +171,7 @@ class SandSimNode(LifecycleNode):
         )
         self._last: Observation | None = None
         self._told = time.monotonic()
-        self._connect(world)
+        self._connect(world, robot.fixed_frames() if robot else [])
         self._endings.callback(self.simulation.stop)  # before what it publishes to goes
         if world.assembly.time_step.warning:
             self.get_logger().warning(world.assembly.time_step.warning)
@@ -178,7 +181,7 @@ class SandSimNode(LifecycleNode):
         self.simulation.start()
         self.get_logger().info(f"scene '{scene.name}' is ready, pacing {parameters['pacing']}")
 
-    def _connect(self, world: World) -> None:
+    def _connect(self, world: World, frames: list[Frame]) -> None:
         connections, parameters = Connections(self), self.parameters
         self._endings.callback(connections.close)
         self._clock_publisher = connections.publisher(Clock, "/clock") if parameters["publish_clock"] else None
@@ -187,7 +190,7 @@ class SandSimNode(LifecycleNode):
         self._tools = [ToolOutputs(connections, parameters, world, tool.name) for tool in world.scene.tools]
         self._bed = BedOutputs(connections, parameters, world, self._complain)
         self._endings.callback(self._bed.close)
-        ToolInputs(connections, parameters, self.simulation, lambda: self._active)
+        ToolInputs(connections, parameters, self.simulation, lambda: self._active, frames)
         Services(self, connections, self.simulation, self.hold)
         self._diagnosis = Diagnosis(self.simulation, self.get_name())
         connections.timer(_DIAGNOSTICS_PERIOD, self._diagnose)

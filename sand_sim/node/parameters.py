@@ -45,6 +45,10 @@ DECLARATIONS = (
     Declaration("real_time_factor", 1.0, "Simulated over wall seconds in realtime pacing [1].", 0.001, 1000.0, changeable=True),
     Declaration("frame_id", "world", "Name of the world frame in all messages."),
     Declaration("frame_names", [""], "Names of fixed frames that poses may be given in; each has frames.NAME.pose and .parent."),
+    Declaration("robot_description", "", "URDF whose links tools may be and whose fixed frames poses may be given in."),
+    Declaration("robot_description_topic", "", "Topic that tells the URDF instead, such as /robot_description."),
+    Declaration("robot_description_timeout", 10.0, "How long to wait for the topic when configuring [s].", 0.0, 1.0e6),
+    Declaration("mesh_roots", [""], "Folders for meshes of robot descriptions; '' for the usual ones and all ROS packages."),
     Declaration("publish_clock", True, "Publish simulated time on /clock; false beside another source of it."),
     Declaration("stamps", "simulated", "What stamps of commands mean.", choices=("simulated", "ignored")),
     Declaration("stamp_oldest", 0.5, "How far a stamp may lie behind simulated time [s].", 0.0, 1.0e9, changeable=True),
@@ -72,11 +76,11 @@ DECLARATIONS = (
 )
 
 
-def tool_declarations(tool: str) -> tuple[Declaration, ...]:
-    """The parameters of one tool."""
+def tool_declarations(tool: str, link: str = "") -> tuple[Declaration, ...]:
+    """The parameters of one tool, which may be a link of a robot."""
     return (
         Declaration(f"tools.{tool}.source", "pose", "Topic that drives the tool.", choices=SOURCES),
-        Declaration(f"tools.{tool}.frame", tool, "Frame that is the tool's, for TF."),
+        Declaration(f"tools.{tool}.frame", link or tool, "Frame that is the tool's, for TF."),
         Declaration(f"tools.{tool}.wrench_frame", "tool", "Axes of the wrench.", choices=WRENCH_FRAMES, changeable=True),
     )
 

@@ -1,6 +1,6 @@
 """What drives the tools: poses, velocities or TF, each from its topic to the simulation."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,14 +26,23 @@ class ToolInputs:
         parameters: of the node, those of the tools declared.
         simulation: that gets the commands.
         active: tells whether commands are taken now.
+        frames: fixed ones of the robot, parents first; those that parameters fix, too, are as the parameters say.
 
     Raises:
         ValueError: if a tool is to follow TF and its messages are not installed, or a fixed frame cannot be.
     """
 
-    def __init__(self, connections: Connections, parameters: Parameters, simulation: Simulation, active: Callable[[], bool]):
+    def __init__(
+        self,
+        connections: Connections,
+        parameters: Parameters,
+        simulation: Simulation,
+        active: Callable[[], bool],
+        frames: Sequence[Frame] = (),
+    ):
         self._parameters, self._simulation, self._active = parameters, simulation, active
-        self._frames = _fixed_frames(parameters)
+        self._frames = _fixed_frames(parameters, frames)
+        self._fixed = {*parameters["frame_names"], *(frame.name for frame in frames)}
         self._followers: dict[str, str] = {}
         for tool in simulation.world.scene.tools:
             self._connect(connections, tool.name)
@@ -93,8 +102,8 @@ class ToolInputs:
     def _hear_frames(self, message, fixed: bool) -> None:
         told = {}
         for frame in tf2_msgs.message_to_frames(message, fixed):
-            if frame.name in self._parameters["frame_names"]:
-                continue  # what the parameters fix stays
+            if frame.name in self._fixed:
+                continue  # what the parameters and the robot description fix stays
             try:
                 self._frames.put(frame)
                 told[frame.name] = frame.time
@@ -119,9 +128,16 @@ class ToolInputs:
             self._submit(read, tool)
 
 
-def _fixed_frames(parameters: Parameters) -> FrameTree:
+def _fixed_frames(parameters: Parameters, of_robot: Sequence[Frame]) -> FrameTree:
     tree = FrameTree(parameters["frame_id"])
     names = [name for name in parameters["frame_names"] if name]
+    for frame in of_robot:
+        if frame.name in names:
+            continue
+        try:
+            tree.put(frame)
+        except CommandError as error:
+            raise ValueError(f"robot description: {error}") from None
     for name in names:
         parameters.declare(frame_declarations(name))
         pose = np.array(parameters[f"frames.{name}.pose"])

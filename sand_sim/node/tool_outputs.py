@@ -66,8 +66,9 @@ class ToolOutputs:
 
     @property
     def follows(self) -> bool:
-        """Whether the tool follows TF, so that we must not tell its frame."""
-        return self._parameters[f"tools.{self._tool}.source"] == "tf"
+        """Whether others tell its frame, so that we must not: it follows TF, or the frame is that of a link of a robot."""
+        link = self._world.scene.tool(self._tool).link
+        return self._parameters[f"tools.{self._tool}.source"] == "tf" or self._frame_id == link
 
     @property
     def _frame_id(self) -> str:

@@ -31,8 +31,8 @@ from sand_sim.scene.types import (
     Waypoint,
 )
 
-_TOOL_FIELDS = ("mesh", "material", "particle_radius", "particle_spacing", "contact", "scale", "thickness", "pose", "max_speed")
-_TOOL_FIELDS += ("trajectory",)
+_TOOL_FIELDS = ("mesh", "urdf", "link", "material", "particle_radius", "particle_spacing", "contact", "scale", "thickness")
+_TOOL_FIELDS += ("pose", "max_speed", "trajectory")
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -185,7 +185,15 @@ def _fill(entry: Field, folder: Path) -> Fill:
 
 
 def _tool(name: str, entry: Field) -> Tool:
-    entry.keys(_TOOL_FIELDS, required=("mesh", "material", "particle_radius"))
+    entry.keys(_TOOL_FIELDS, required=("material", "particle_radius"))
+    if ("mesh" in entry) == ("link" in entry):
+        raise entry.refuse(
+            "give exactly one of 'mesh' and 'link'; a 'link' is one of the URDF file 'urdf', or of the node's robot"
+        )
+    if "mesh" in entry and "urdf" in entry:
+        raise entry["urdf"].refuse("needs a 'link' instead of a 'mesh'")
+    if "link" in entry and "scale" in entry:
+        raise entry["scale"].refuse("a URDF is in metres and scales its meshes itself; leave it out")
     if not name.isidentifier():
         raise entry.refuse("a tool's name becomes part of its topics: letters, digits and underscores only")
     track = []
@@ -199,7 +207,9 @@ def _tool(name: str, entry: Field) -> Tool:
     initial = track[0].pose if track and "pose" not in entry else Pose()
     return Tool(
         name,
-        mesh=entry["mesh"].text(),
+        mesh=entry.optional("mesh", Field.text, ""),
+        urdf=entry.optional("urdf", Field.text, ""),
+        link=entry.optional("link", Field.text, ""),
         material=entry["material"].text(),
         particle_radius=entry["particle_radius"].number(above=0.0, unit="m"),
         particle_spacing=entry.optional("particle_spacing", lambda f: f.number(above=0.0, unit="m"), None),

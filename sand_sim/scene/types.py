@@ -172,12 +172,14 @@ class Body:
 
 @dataclass(frozen=True)
 class Tool:
-    """A driven rigid body: grains touch particles sampled from a mesh, or the mesh itself."""
+    """A driven rigid body: grains touch particles sampled from a mesh, or the mesh itself, which may be a link of a robot."""
 
     name: str
-    mesh: str
+    mesh: str  # empty for a link
     material: str
     particle_radius: float  # [m]
+    urdf: str = ""  # file of the link; empty: the description that the scene is given
+    link: str = ""
     particle_spacing: float | None = None  # [m]; None: chosen from radius and grains
     contact: str = ROUGH  # or SMOOTH
     scale: float = 1.0  # [m per mesh unit]
@@ -237,6 +239,8 @@ class Scene:
     duration: float = 1.0  # [s] played by ``sand_sim run``
     frame_rate: float = 50.0  # [1/s] observations per simulated second
     folder: Path = field(default_factory=Path.cwd)  # relative paths start here
+    robot_description: str = ""  # content of a URDF, of which tools are links
+    mesh_roots: tuple[str, ...] = ("",)  # folders for meshes of robot descriptions, see ``sand_sim.mesh_roots``
 
     def material_index(self, name: str) -> int:
         """Index of a material in ``materials``."""

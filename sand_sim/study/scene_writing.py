@@ -46,7 +46,7 @@ def change_text(text: str, edited: dict) -> str:
 def _moved(parsed: dict, old: Path, new: Path) -> dict:
     """The scene with its relative paths starting at another folder."""
     moved = deepcopy(parsed)
-    for key, entries in (("mesh", moved.get("tools", {}).values()), ("file", moved["fills"])):
+    for key, entries in (*((key, moved.get("tools", {}).values()) for key in ("mesh", "urdf")), ("file", moved["fills"])):
         for entry in entries:
             if key in entry and (old / entry[key]).is_file() and not Path(entry[key]).is_absolute():
                 entry[key] = os.path.relpath((old / entry[key]).resolve(), new.resolve())

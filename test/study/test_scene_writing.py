@@ -56,13 +56,21 @@ def test_one_line_changes_and_all_others_stay(path, value, line):
 def test_relative_paths_start_at_the_new_folder(tmp_path):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes/a.stl").write_text("solid")
+    (tmp_path / "arm.urdf").write_text("<robot/>")
     source = tmp_path / "scene.yaml"
-    source.write_text("fills: []  # none\ntools:\n  one: {mesh: meshes/a.stl}\n  two: {mesh: package://robot/b.stl}\n")
+    source.write_text(
+        "fills: []  # none\ntools:\n"
+        "  one: {mesh: meshes/a.stl}\n  two: {mesh: package://robot/b.stl}\n  three: {urdf: arm.urdf}\n"
+    )
     target = tmp_path / "further/new.yaml"
     assert write_scene(source, yaml.safe_load(source.read_text()), target)
     written = target.read_text()
     assert "# none" in written
-    assert yaml.safe_load(written)["tools"] == {"one": {"mesh": "../meshes/a.stl"}, "two": {"mesh": "package://robot/b.stl"}}
+    assert yaml.safe_load(written)["tools"] == {
+        "one": {"mesh": "../meshes/a.stl"},
+        "two": {"mesh": "package://robot/b.stl"},
+        "three": {"urdf": "../arm.urdf"},
+    }
 
 
 def test_what_cannot_be_changed_in_its_place_is_written_anew(tmp_path):
