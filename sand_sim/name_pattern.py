@@ -43,10 +43,10 @@ _Builder = Callable[[_State], _State]  # given what follows a part of the patter
 
 
 class NamePattern:
-    """A compiled pattern.
+    r"""A compiled pattern.
 
     Literals, ``.``, ``[...]`` with ranges and classes such as ``[:alpha:]``, ``( )``, ``|``, ``*``, ``+``, ``?``, ``{m,n}``,
-    ``^``, ``$``, and ``\\`` before a character that is meant as such. No references to groups, which POSIX has not either.
+    ``^``, ``$``, and ``\`` before a character that is meant as such. No references to groups, which POSIX has not either.
 
     Args:
         text: of the pattern.

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rosgraph_msgs.msg import Clock
 
-from msg_adapters import tf2_msgs
+from msg_adapters import simulation_interfaces, tf2_msgs
 from msg_adapters.builtin_interfaces import time_to_stamp
 from sand_sim.border import Observation
 from sand_sim.config_folder import find_scene
@@ -21,6 +21,7 @@ from sand_sim.node.connections import Connections
 from sand_sim.node.diagnosis import Diagnosis
 from sand_sim.node.parameters import Parameters, tool_declarations
 from sand_sim.node.services import Services
+from sand_sim.node.simulation_services import SimulationServices
 from sand_sim.node.tool_inputs import ToolInputs
 from sand_sim.node.tool_outputs import ToolOutputs
 from sand_sim.report import progress_line
@@ -187,8 +188,12 @@ class SandSimNode(LifecycleNode):
         self._tools = [ToolOutputs(connections, parameters, world, tool.name) for tool in world.scene.tools]
         self._bed = BedOutputs(connections, parameters, world, self._complain)
         self._endings.callback(self._bed.close)
-        ToolInputs(connections, parameters, self.simulation, lambda: self._active)
-        Services(self, connections, self.simulation, self.hold)
+        inputs = ToolInputs(connections, parameters, self.simulation, lambda: self._active)
+        services = Services(self, connections, self.simulation, self.hold)
+        if simulation_interfaces.srv is None:
+            self.get_logger().info("simulation_interfaces is not installed: its services are absent", once=True)
+        else:
+            SimulationServices(self, connections, services, self.simulation, inputs.frames, lambda: self._last)
         self._diagnosis = Diagnosis(self.simulation, self.get_name())
         connections.timer(_DIAGNOSTICS_PERIOD, self._diagnose)
 

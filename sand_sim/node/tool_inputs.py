@@ -29,11 +29,14 @@ class ToolInputs:
 
     Raises:
         ValueError: if a tool is to follow TF and its messages are not installed, or a fixed frame cannot be.
+
+    Attributes:
+        frames: in which poses may be given.
     """
 
     def __init__(self, connections: Connections, parameters: Parameters, simulation: Simulation, active: Callable[[], bool]):
         self._parameters, self._simulation, self._active = parameters, simulation, active
-        self._frames = _fixed_frames(parameters)
+        self.frames = _fixed_frames(parameters)
         self._followers: dict[str, str] = {}
         for tool in simulation.world.scene.tools:
             self._connect(connections, tool.name)
@@ -73,7 +76,7 @@ class ToolInputs:
     def _pose(self, message: PoseStamped, tool: str) -> ToolPose:
         command = pose_to_command(message, tool)
         try:
-            position, orientation = self._frames.in_root(message.header.frame_id, command.position, command.orientation)
+            position, orientation = self.frames.in_root(message.header.frame_id, command.position, command.orientation)
         except CommandError as error:
             raise CommandError(error.reason, f"tool '{tool}': header.frame_id: {error}") from None
         return replace(command, position=position, orientation=orientation)
@@ -85,7 +88,7 @@ class ToolInputs:
         if own:
             return command
         try:
-            _, turn = self._frames.in_root(frame, _NO_MOVE, _NO_TURN)
+            _, turn = self.frames.in_root(frame, _NO_MOVE, _NO_TURN)
         except CommandError as error:
             raise CommandError(error.reason, f"tool '{tool}': header.frame_id: {error}") from None
         return replace(command, linear=rotation.rotate(turn, command.linear), angular=rotation.rotate(turn, command.angular))
@@ -96,7 +99,7 @@ class ToolInputs:
             if frame.name in self._parameters["frame_names"]:
                 continue  # what the parameters fix stays
             try:
-                self._frames.put(frame)
+                self.frames.put(frame)
                 told[frame.name] = frame.time
             except CommandError as error:
                 self._simulation.reject(error)
@@ -107,10 +110,10 @@ class ToolInputs:
         """Command the pose of a frame if news concern it."""
 
         def read() -> ToolPose:
-            return ToolPose(tool, *self._frames.in_root(name, _NO_MOVE, _NO_TURN), time=latest or None)
+            return ToolPose(tool, *self.frames.in_root(name, _NO_MOVE, _NO_TURN), time=latest or None)
 
         try:
-            chain = [frame.name for frame in self._frames.chain(name)]
+            chain = [frame.name for frame in self.frames.chain(name)]
         except CommandError:
             return  # not told yet
         news = [told[frame] or 0.0 for frame in chain if frame in told]
