@@ -8,7 +8,7 @@ import string
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-_LONGEST, _DEEPEST, _MOST_STATES, _MOST_TIMES = 256, 32, 4096, 255
+_LONGEST, _DEEPEST, _MOST_STATES, _MOST_TIMES = 256, 32, 1000, 255
 _CLASSES = {
     "alpha": str.isalpha,
     "digit": str.isdigit,

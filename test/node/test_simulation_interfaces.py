@@ -166,6 +166,23 @@ def test_steps(run, client, package):
     assert "not paused" in answer.error_message
 
 
+def test_endless_steps_of_a_service_do_not_make_the_node_deaf(run, client, package):
+    results, states = package.msg.Result, package.msg.SimulationState
+    node = run(pacing="realtime", paused=True)
+    node.ask("StepSimulation", steps=1)
+    steps = client.node.create_client(package.srv.StepSimulation, "/sand_sim/step_simulation")
+    client.wait_for(steps.service_is_ready)
+    answer = steps.call_async(package.srv.StepSimulation.Request(steps=2**64 - 1))
+    client.wait_for(lambda: client.time > 5 * FRAME)
+    assert node.state() == states.STATE_PAUSED
+    assert node.ask("GetEntityState", entity="plate").result.result == results.RESULT_OK
+    assert not answer.done()
+    assert node.enter(states.STATE_STOPPED) == results.RESULT_OK
+    client.wait_for(answer.done)
+    assert answer.result().result.result == results.RESULT_OPERATION_FAILED
+    assert node.state() == states.STATE_STOPPED
+
+
 def change(client, label):
     """Whether a transition of the lifecycle has been made."""
     return client.call(ChangeState, "change_state", ChangeState.Request(transition=Transition(label=label))).success
