@@ -47,7 +47,7 @@ class CheckpointFolder:
     ):
         self.folder, self.period, self._name, self._report, self._kept = Path(folder), period, name, report, kept
         if not period >= 0.0:
-            raise CheckpointError(f"--checkpoint-period: must be 0 s or more, got {period:g}")
+            raise CheckpointError(f"period of checkpoints: must be 0 s or more, got {period:g}")
         self._pattern = re.compile(re.escape(name) + r"\.(\d+)\.checkpoint")
         try:
             self.folder.mkdir(parents=True, exist_ok=True)

@@ -1,5 +1,8 @@
-"""Named arguments of services that take more than a trigger: ``rcl_interfaces/SetParametersAtomically``, the one standard service
-with names, values of any type, and a reason in its answer."""
+"""Named arguments of services that take more than a trigger.
+
+They are of type ``rcl_interfaces/SetParametersAtomically``, the one standard service with names, values of any type, and a reason
+in its answer.
+"""
 
 from typing import Any
 

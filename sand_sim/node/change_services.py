@@ -9,9 +9,11 @@ import numpy as np
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 
+from sand_sim.mesh_roots import allowed_mesh, mesh_roots
 from sand_sim.node.arguments import ArgumentError, read_arguments
 from sand_sim.node.connections import Connections
 from sand_sim.node.services import Services
+from sand_sim.scene.types import SceneError
 from sand_sim.simulation import Simulation
 
 _TEXT, _NUMBER = Parameter.Type.STRING, Parameter.Type.DOUBLE
@@ -28,19 +30,11 @@ class ChangeServices:
         services: that wait for the stepping thread.
         simulation: whose world is changed.
         states: folder of the states.
-        find_mesh: gives the file of a mesh's address if it may be read; ``CommandError`` otherwise.
     """
 
-    def __init__(
-        self,
-        connections: Connections,
-        services: Services,
-        simulation: Simulation,
-        states: Path,
-        find_mesh: Callable[[str], Path],
-    ):
+    def __init__(self, connections: Connections, services: Services, simulation: Simulation, states: Path):
         self._services, self._simulation, self._world = services, simulation, simulation.world
-        self._states, self._find_mesh = states, find_mesh
+        self._states = states
         for name, needed, optional, ask in (
             ("save_state", {}, {"name": _TEXT}, self._save),
             ("load_state", {}, {"name": _TEXT}, self._load),
@@ -86,7 +80,7 @@ class ChangeServices:
 
         return self._simulation.change(act)
 
-    def _remove(self, id: list | None = None, low: list | None = None, high: list | None = None):  # noqa: A002
+    def _remove(self, id: list | None = None, low: list | None = None, high: list | None = None):
         if (id is None) == (low is None) or (low is None) != (high is None):
             raise ArgumentError("give either 'id', or 'low' and 'high' of a box")
         box = None if low is None else (_triples("low", low)[0], _triples("high", high)[0])
@@ -94,9 +88,15 @@ class ChangeServices:
         return self._simulation.change(lambda: f"{len(self._world.remove_grains(identity, box))} grains")
 
     def _set_mesh(self, tool: str, mesh: str, scale: float = 1.0):
+        scene = self._world.scene
+        try:
+            path = allowed_mesh(mesh, *mesh_roots(scene.mesh_roots, scene.folder))
+        except SceneError as error:
+            raise ArgumentError(f"argument 'mesh': {error}") from None
+
         def act() -> str:
-            self._world.set_tool_mesh(tool, str(self._find_mesh(mesh)), scale)
-            return f"tool '{tool}' has mesh {mesh}"
+            self._world.set_tool_mesh(tool, str(path), scale)
+            return f"tool '{tool}' has mesh {path.name}"
 
         return self._simulation.change(act)
 

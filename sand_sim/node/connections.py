@@ -1,8 +1,9 @@
-"""Publishers, subscriptions, services and timers of a configured node, which come and go together."""
+"""Publishers, subscriptions, services, actions and timers of a configured node, which come and go together."""
 
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.action import ActionServer
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -49,6 +50,11 @@ class Connections:
         """A service."""
         made = self._node.create_service(kind, name, answer)
         self._undo.append(lambda: self._node.destroy_service(made))
+
+    def action(self, kind: type, name: str, execute: Callable, cancel: Callable) -> None:
+        """An action, with what runs a goal and what answers a wish to cancel it."""
+        made = ActionServer(self._node, kind, name, execute, cancel_callback=cancel)
+        self._undo.append(made.destroy)
 
     def timer(self, period: float, act: Callable[[], None]) -> None:
         """A timer by the wall clock [s]."""

@@ -3,6 +3,7 @@
 import time
 from contextlib import ExitStack
 from dataclasses import replace
+from itertools import chain, count
 from pathlib import Path
 
 import numpy as np
@@ -10,18 +11,21 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rosgraph_msgs.msg import Clock
 
-from msg_adapters import tf2_msgs
+from msg_adapters import simulation_interfaces, tf2_msgs
 from msg_adapters.builtin_interfaces import time_to_stamp
 from sand_sim.border import Frame, Observation
+from sand_sim.checkpoints import CheckpointFolder
 from sand_sim.config_folder import find_scene
 from sand_sim.courses import StampRules
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.node.bed_outputs import BedOutputs
+from sand_sim.node.change_services import ChangeServices
 from sand_sim.node.connections import Connections
 from sand_sim.node.diagnosis import Diagnosis
 from sand_sim.node.parameters import Parameters, tool_declarations
 from sand_sim.node.robot import read_robot
 from sand_sim.node.services import Services
+from sand_sim.node.simulation_services import SimulationServices
 from sand_sim.node.tool_inputs import ToolInputs
 from sand_sim.node.tool_outputs import ToolOutputs
 from sand_sim.report import progress_line
@@ -157,8 +161,12 @@ class SandSimNode(LifecycleNode):
         description, robot = read_robot(self, self._progress)
         scene = replace(scene, robot_description=description, mesh_roots=tuple(parameters["mesh_roots"]))
         world = World(scene, self._progress)
-        paths = (Path(parameters[name]).expanduser() if parameters[name] else None for name in ("recording", "output"))
-        self.recorder = Recorder(world, *paths, parameters["view"], parameters["particles"])
+        recording, output = (
+            Path(parameters[name]).expanduser() if parameters[name] else None for name in ("recording", "output")
+        )
+        if recording and parameters["resume"]:
+            recording = _unused(recording)
+        self.recorder = Recorder(world, recording, output, parameters["view"], parameters["particles"], self.get_logger().warning)
         self._endings.callback(self._finish_files)
         self.simulation = Simulation(
             world,
@@ -168,11 +176,16 @@ class SandSimNode(LifecycleNode):
             on_fault=self._fail,
             on_reject=lambda error: self.get_logger().warning(f"rejected: {error}", throttle_duration_sec=1.0),
             rules=self._rules(),
+            checkpoints=self._open_checkpoints(scene.name),
+            pack_history=lambda: self.recorder.log.pack(),  # noqa: PLW0108 - the log is another one after a reset
+            unpack_history=lambda packed: self.recorder.log.unpack(packed),  # noqa: PLW0108
         )
         self._last: Observation | None = None
         self._told = time.monotonic()
         self._connect(world, robot.fixed_frames() if robot else [])
         self._endings.callback(self.simulation.stop)  # before what it publishes to goes
+        if parameters["resume"]:
+            self.simulation.resume()
         if world.assembly.time_step.warning:
             self.get_logger().warning(world.assembly.time_step.warning)
         self._warn_of_coarse_points(world)
@@ -180,6 +193,15 @@ class SandSimNode(LifecycleNode):
         self.hold(parameters["paused"])
         self.simulation.start()
         self.get_logger().info(f"scene '{scene.name}' is ready, pacing {parameters['pacing']}")
+
+    def _open_checkpoints(self, scene: str) -> CheckpointFolder | None:
+        parameters = self.parameters
+        if not (parameters["checkpoints"] or parameters["resume"]):
+            return None
+        period = parameters["checkpoint_period"] if parameters["checkpoints"] else np.inf
+        folder = CheckpointFolder(Path(parameters["states"]).expanduser(), scene, period, self.get_logger().info)
+        self._endings.callback(folder.close)
+        return folder
 
     def _connect(self, world: World, frames: list[Frame]) -> None:
         connections, parameters = Connections(self), self.parameters
@@ -190,8 +212,13 @@ class SandSimNode(LifecycleNode):
         self._tools = [ToolOutputs(connections, parameters, world, tool.name) for tool in world.scene.tools]
         self._bed = BedOutputs(connections, parameters, world, self._complain)
         self._endings.callback(self._bed.close)
-        ToolInputs(connections, parameters, self.simulation, lambda: self._active, frames)
-        Services(self, connections, self.simulation, self.hold)
+        inputs = ToolInputs(connections, parameters, self.simulation, lambda: self._active, frames)
+        services = Services(self, connections, self.simulation, self.hold)
+        ChangeServices(connections, services, self.simulation, Path(parameters["states"]).expanduser())
+        if simulation_interfaces.srv is None:
+            self.get_logger().info("simulation_interfaces is not installed: its services are absent", once=True)
+        else:
+            SimulationServices(self, connections, services, self.simulation, inputs.frames, lambda: self._last)
         self._diagnosis = Diagnosis(self.simulation, self.get_name())
         connections.timer(_DIAGNOSTICS_PERIOD, self._diagnose)
 
@@ -254,3 +281,9 @@ class SandSimNode(LifecycleNode):
             # Whoever comes now still sees the last good state.
             self._publish_state(self._last)
             self._bed.tell(self._last)
+
+
+def _unused(path: Path) -> Path:
+    """The path, with a number where there is such a file: a run that goes on must not replace what has been recorded before."""
+    numbered = (path.with_stem(f"{path.stem}.{number}") for number in count(2))
+    return next(one for one in chain([path], numbered) if not one.exists())

@@ -30,6 +30,9 @@ class ToolInputs:
 
     Raises:
         ValueError: if a tool is to follow TF and its messages are not installed, or a fixed frame cannot be.
+
+    Attributes:
+        frames: in which poses may be given.
     """
 
     def __init__(
@@ -41,7 +44,7 @@ class ToolInputs:
         frames: Sequence[Frame] = (),
     ):
         self._parameters, self._simulation, self._active = parameters, simulation, active
-        self._frames = _fixed_frames(parameters, frames)
+        self.frames = _fixed_frames(parameters, frames)
         self._fixed = {*parameters["frame_names"], *(frame.name for frame in frames)}
         self._followers: dict[str, str] = {}
         for tool in simulation.world.scene.tools:
@@ -82,7 +85,7 @@ class ToolInputs:
     def _pose(self, message: PoseStamped, tool: str) -> ToolPose:
         command = pose_to_command(message, tool)
         try:
-            position, orientation = self._frames.in_root(message.header.frame_id, command.position, command.orientation)
+            position, orientation = self.frames.in_root(message.header.frame_id, command.position, command.orientation)
         except CommandError as error:
             raise CommandError(error.reason, f"tool '{tool}': header.frame_id: {error}") from None
         return replace(command, position=position, orientation=orientation)
@@ -94,7 +97,7 @@ class ToolInputs:
         if own:
             return command
         try:
-            _, turn = self._frames.in_root(frame, _NO_MOVE, _NO_TURN)
+            _, turn = self.frames.in_root(frame, _NO_MOVE, _NO_TURN)
         except CommandError as error:
             raise CommandError(error.reason, f"tool '{tool}': header.frame_id: {error}") from None
         return replace(command, linear=rotation.rotate(turn, command.linear), angular=rotation.rotate(turn, command.angular))
@@ -105,7 +108,7 @@ class ToolInputs:
             if frame.name in self._fixed:
                 continue  # what the parameters and the robot description fix stays
             try:
-                self._frames.put(frame)
+                self.frames.put(frame)
                 told[frame.name] = frame.time
             except CommandError as error:
                 self._simulation.reject(error)
@@ -116,10 +119,10 @@ class ToolInputs:
         """Command the pose of a frame if news concern it."""
 
         def read() -> ToolPose:
-            return ToolPose(tool, *self._frames.in_root(name, _NO_MOVE, _NO_TURN), time=latest or None)
+            return ToolPose(tool, *self.frames.in_root(name, _NO_MOVE, _NO_TURN), time=latest or None)
 
         try:
-            chain = [frame.name for frame in self._frames.chain(name)]
+            chain = [frame.name for frame in self.frames.chain(name)]
         except CommandError:
             return  # not told yet
         news = [told[frame] or 0.0 for frame in chain if frame in told]

@@ -69,9 +69,11 @@ class Client:
         self.node.destroy_node()
 
 
-def drive(client, scene):
-    """Send the whole trajectory of the scene, stamped, frame by frame; what comes back is kept for five frames only."""
-    for at in frame_times(scene):
+def drive(client, scene, begin=0.0, end=None):
+    """Send the trajectory of the scene, stamped, frame by frame; what comes back is kept for five frames only."""
+    for at in frame_times(scene, end):
+        if at < begin + 1e-6:
+            continue
         for command in commands_at(scene, at):
             client.poses.publish(command_to_pose(command, "world"))
         client.wait_for(lambda: client.time > at - 1e-6)  # noqa: B023

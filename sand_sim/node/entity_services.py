@@ -1,0 +1,188 @@
+"""The entities of ``simulation_interfaces``: tools and free rigid bodies, told and, tools only, moved."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from msg_adapters.simulation_interfaces import (
+    filters_to_asked,
+    msg,
+    report_to_state,
+    srv,
+    state_to_command,
+    texts_to_info,
+)
+from sand_sim import rotation
+from sand_sim.border import BodyReport, CommandError, Observation, ToolPose, ToolReport
+from sand_sim.frames import FrameTree
+from sand_sim.name_pattern import NamePattern, PatternError
+from sand_sim.node.connections import Connections
+from sand_sim.node.services import Services
+from sand_sim.simulation import Simulation
+
+FEATURES = (
+    "ENTITY_TAGS",
+    "ENTITY_CATEGORIES",
+    "ENTITY_STATE_GETTING",
+    "ENTITY_STATE_SETTING",
+    "ENTITY_INFO_GETTING",
+)
+
+
+class EntityServices:
+    """Tells of entities as they were at the end of the last frame.
+
+    Args:
+        connections: where services are made.
+        services: that wait for the stepping thread.
+        simulation: that runs.
+        frames: in which poses may be given.
+        last: the last observation, None before the first.
+    """
+
+    def __init__(
+        self,
+        connections: Connections,
+        services: Services,
+        simulation: Simulation,
+        frames: FrameTree,
+        last: Callable[[], Observation | None],
+    ):
+        self._services, self._simulation, self._frames, self._last = services, simulation, frames, last
+        connections.service(srv.GetEntities, "~/get_entities", self._list)
+        connections.service(srv.GetEntitiesStates, "~/get_entities_states", self._list_states)
+        connections.service(srv.GetEntityState, "~/get_entity_state", self._tell_state)
+        connections.service(srv.GetEntityInfo, "~/get_entity_info", self._tell_info)
+        connections.service(srv.SetEntityState, "~/set_entity_state", self._set_state)
+
+    def _entities(self) -> dict[str, ToolReport | BodyReport]:
+        """All of them by name; of a body whose name a tool has, too, with a prefix."""
+        last = self._last()
+        if last is None:
+            return {}
+        tools = {report.name: report for report in last.tools}
+        return tools | {f"bodies/{body.name}" if body.name in tools else body.name: body for body in last.bodies}
+
+    def _list(self, request, response):
+        response.result, response.entities = self._asked_for(request.filters)
+        return response
+
+    def _list_states(self, request, response):
+        response.result, response.entities = self._asked_for(request.filters)
+        entities = self._entities()
+        response.states = [self._state(entities[name]) for name in response.entities]
+        return response
+
+    def _tell_state(self, request, response):
+        response.result, report = self._find(request.entity)
+        if report is not None:
+            response.state = self._state(report)
+        return response
+
+    def _tell_info(self, request, response):
+        response.result, report = self._find(request.entity)
+        if report is not None:
+            kind = "tool, moved by commands" if isinstance(report, ToolReport) else f"free rigid body of {report.mass:.4g} kg"
+            response.info = texts_to_info(_category(report), kind, list(_tags(report)))
+        return response
+
+    async def _set_state(self, request, response):
+        response.result, report = self._find(request.entity)
+        if report is None:
+            return response
+        if isinstance(report, BodyReport):
+            response.result = unsupported(f"'{request.entity}' is a free rigid body; only tools can be set")
+        elif getattr(request, "set_twist", False) or getattr(request, "set_acceleration", False):
+            response.result = unsupported(f"'{request.entity}' is a tool; only its pose can be set (set_pose)")
+        elif not getattr(request, "set_pose", True):  # the first versions have no such flags
+            response.result = failed("nothing is to be set; set_pose is false")
+        else:
+            response.result = await self._go(report.name, request.state)
+        return response
+
+    async def _go(self, tool: str, state):
+        try:
+            command, frame = state_to_command(state, tool), state.header.frame_id or self._frames.root
+            with np.errstate(over="ignore", invalid="ignore"):  # what comes of huge numbers is refused
+                place = self._frames.in_root(frame, command.position, command.orientation)
+                command = self._simulation.world.check(replace(command, position=place[0], orientation=place[1]))
+        except CommandError as error:
+            self._simulation.reject(error)
+            invalid = getattr(srv.SetEntityState.Response, "INVALID_POSE", msg.Result.RESULT_OPERATION_FAILED)
+            code = msg.Result.RESULT_OPERATION_FAILED if error.reason == "unknown_frame" else invalid
+            return msg.Result(result=code, error_message=str(error))
+        good, told = await self._services.outcome(lambda: self._simulation.request(lambda: self._take(command)))
+        return succeeded() if good else failed(told)
+
+    def _take(self, command: ToolPose) -> None:
+        """Carry a command out in the stepping thread."""
+        if self._simulation.fault is not None:
+            raise CommandError("stopped", "stepping has stopped; reset to go on")
+        errors: list[CommandError] = []
+        with np.errstate(over="ignore", invalid="ignore"):
+            self._simulation.courses.take([command], errors.append)
+        for error in errors:
+            self._simulation.reject(error)
+            raise error
+
+    def _find(self, name: str):
+        """A result, and the entity if there is one of this name."""
+        report = self._entities().get(name)
+        if report is None:
+            return msg.Result(result=msg.Result.RESULT_NOT_FOUND, error_message=_unknown(name, self._entities())), None
+        return succeeded(), report
+
+    def _asked_for(self, filters):
+        """A result, and the names of the entities that pass."""
+        asked = filters_to_asked(filters)
+        if asked.bounded:
+            return unsupported("filters.bounds: entities cannot be selected by region"), []
+        try:
+            pattern = NamePattern(asked.pattern)
+        except PatternError as error:
+            return failed(f"filters.filter: {error}"), []
+        some = all if asked.all_tags else any
+        return succeeded(), [
+            name
+            for name, report in self._entities().items()
+            if pattern.found_in(name)
+            and (not asked.categories or _category(report) in asked.categories)
+            and (not asked.tags or some(tag in _tags(report) for tag in asked.tags))
+        ]
+
+    def _state(self, report: ToolReport | BodyReport):
+        velocity = report.velocity
+        if isinstance(report, BodyReport):
+            # Told is that of the centre of mass.
+            model = next(model for model in self._simulation.world.assembly.bodies if model.body.name == report.name)
+            velocity = velocity - np.cross(report.spin, rotation.rotate(report.orientation, model.shape.middle))
+        return report_to_state(report, velocity, self._last().time, self._frames.root)
+
+
+def succeeded():
+    """A good result."""
+    return msg.Result(result=msg.Result.RESULT_OK)
+
+
+def failed(why: str):
+    """Understood, but it could not be done."""
+    return msg.Result(result=msg.Result.RESULT_OPERATION_FAILED, error_message=why)
+
+
+def unsupported(why: str):
+    """Never done here."""
+    return msg.Result(result=msg.Result.RESULT_FEATURE_UNSUPPORTED, error_message=why)
+
+
+def _category(report: ToolReport | BodyReport) -> int:
+    kinds = msg.EntityCategory
+    return kinds.CATEGORY_ROBOT if isinstance(report, ToolReport) else kinds.CATEGORY_DYNAMIC_OBJECT
+
+
+def _tags(report: ToolReport | BodyReport) -> tuple[str, ...]:
+    return ("tool",) if isinstance(report, ToolReport) else ("body",)
+
+
+def _unknown(name: str, known: dict) -> str:
+    return str(CommandError("unknown_entity", f"entity '{name}' is unknown; known are {', '.join(known) or 'none'}"))
