@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from scenes import write_small_scene
 
 from sand_sim import World, load_scene
 from sand_sim.sinks.recorder import Recorder
+from sand_sim.sinks.run_log import RunLog
 
 pytest.importorskip("rerun")
 
@@ -218,3 +220,16 @@ def test_a_viewer_may_be_killed_and_come_back(world, monkeypatch):
     finally:
         if viewer.poll() is None:
             end(viewer)
+
+
+def test_a_history_stays_within_its_bound(tmp_path):
+    """Of a run without end rows are thinned out evenly, from its beginning to now."""
+    world = World(load_scene(write_small_scene(tmp_path)))
+    log, first = RunLog(world.scene, most_rows=20), world.observe()
+    for k in range(1000):
+        log.write(replace(first, steps=k, time=0.02 * k))
+    steps = log.columns()["steps"]
+    assert 10 <= len(steps) <= 20
+    assert steps[0] <= 1
+    assert steps[-1] >= 1000 - 2 * 1000 / 10
+    assert len(set(np.diff(steps))) == 1

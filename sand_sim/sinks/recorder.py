@@ -9,6 +9,9 @@ from sand_sim.border import Observation
 from sand_sim.sinks.run_log import RunLog
 from sand_sim.world import World
 
+_ROWS = 50_000  # of a history that is written in the end
+_ROWS_UNSEEN = 1_000  # of one that is not
+
 
 class RecordingError(ValueError):
     """A recording that cannot be made."""
@@ -46,7 +49,7 @@ class Recorder:
         report: Callable[[str], None] = lambda line: print(f"sand_sim: {line}", file=sys.stderr),
         log: RunLog | None = None,
     ):
-        self.log = log or RunLog(world.scene)
+        self.log = log or RunLog(world.scene, most_rows=_ROWS if output else _ROWS_UNSEEN)
         self.failed: list[Path] = []
         self._world, self._output, self._report = world, output, report
         self._sinks = _open_sinks(world, recording, view, particles, self.log.identity, report) if recording or view else {}
@@ -56,7 +59,7 @@ class Recorder:
     def write(self, observation: Observation) -> None:
         """Add one observation to all sinks; time zero begins a new history."""
         if observation.steps == 0:
-            self.log = RunLog(self._world.scene, identity=self.log.identity)
+            self.log = RunLog(self._world.scene, identity=self.log.identity, most_rows=self.log.most_rows)
         self.log.write(observation)
         for sink in self._sinks.values():
             sink.write(observation)

@@ -61,6 +61,7 @@ class RunLog:
         views: the bed at the end of each phase of a trajectory, by the phase's name.
         fault: why the run stopped before its end, empty if it did not.
         identity: the same before and after a run has been resumed.
+        most_rows: how many are kept; beyond, every other one is given up, and from then on every other frame is written.
     """
 
     scene: Scene
@@ -70,6 +71,9 @@ class RunLog:
     views: dict[str, View] = field(default_factory=dict)
     fault: str = ""
     identity: str = field(default_factory=lambda: uuid4().hex)
+    most_rows: int = 2**31
+    _every: int = 1
+    _frames: int = 0
 
     def write(self, observation: Observation) -> None:
         """Add one observation; a moment that is there already, before a checkpoint, is not added again."""
@@ -78,6 +82,9 @@ class RunLog:
             return
         for phase in phases_at(self.scene, observation.time):
             self.views[phase] = View.of(observation)
+        number, self._frames = self._frames, self._frames + 1
+        if number % self._every:
+            return
         row = {
             "time": observation.time,
             "wall": time.monotonic() - self.started,
@@ -98,6 +105,8 @@ class RunLog:
             if wall.name in self._plungers:
                 row[f"wall.{wall.name}.position"], row[f"wall.{wall.name}.force"] = wall.position, wall.force
         self.rows.append(row)
+        if len(self.rows) > self.most_rows:
+            self.rows, self._every = self.rows[::2], 2 * self._every
 
     @property
     def _names(self) -> set[str]:
