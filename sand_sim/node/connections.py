@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.action import ActionServer
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -23,6 +24,7 @@ class Connections:
     def __init__(self, node: Node):
         self._node = node
         self._undo: list[Callable[[], Any]] = []
+        self._waiting = ReentrantCallbackGroup()  # in the usual group one that waits would keep all others from being heard
 
     def publisher(self, kind: type, topic: str, latched: bool = False) -> Publisher:
         """Reliable, keep last 5, volatile unless latched."""
@@ -47,13 +49,13 @@ class Connections:
         self._undo.append(lambda: self._node.destroy_subscription(made))
 
     def service(self, kind: type, name: str, answer: Callable) -> None:
-        """A service."""
-        made = self._node.create_service(kind, name, answer)
+        """A service; while its answer is awaited, others are answered and messages are heard."""
+        made = self._node.create_service(kind, name, answer, callback_group=self._waiting)
         self._undo.append(lambda: self._node.destroy_service(made))
 
     def action(self, kind: type, name: str, execute: Callable, cancel: Callable) -> None:
         """An action, with what runs a goal and what answers a wish to cancel it."""
-        made = ActionServer(self._node, kind, name, execute, cancel_callback=cancel)
+        made = ActionServer(self._node, kind, name, execute, cancel_callback=cancel, callback_group=self._waiting)
         self._undo.append(made.destroy)
 
     def timer(self, period: float, act: Callable[[], None]) -> None:

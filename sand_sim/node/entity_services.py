@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from rclpy.node import Node
 
 from msg_adapters.simulation_interfaces import (
     filters_to_asked,
@@ -34,6 +35,7 @@ class EntityServices:
     """Tells of entities as they were at the end of the last frame.
 
     Args:
+        node: with ``refusal``.
         connections: where services are made.
         services: that wait for the stepping thread.
         simulation: that runs.
@@ -43,52 +45,55 @@ class EntityServices:
 
     def __init__(
         self,
+        node: Node,
         connections: Connections,
         services: Services,
         simulation: Simulation,
         frames: FrameTree,
         last: Callable[[], Observation | None],
     ):
-        self._services, self._simulation, self._frames, self._last = services, simulation, frames, last
+        self._node, self._services, self._simulation, self._frames, self._last = node, services, simulation, frames, last
         connections.service(srv.GetEntities, "~/get_entities", self._list)
         connections.service(srv.GetEntitiesStates, "~/get_entities_states", self._list_states)
         connections.service(srv.GetEntityState, "~/get_entity_state", self._tell_state)
         connections.service(srv.GetEntityInfo, "~/get_entity_info", self._tell_info)
         connections.service(srv.SetEntityState, "~/set_entity_state", self._set_state)
 
-    def _entities(self) -> dict[str, ToolReport | BodyReport]:
-        """All of them by name; of a body whose name a tool has, too, with a prefix."""
+    def _now(self) -> tuple[float, dict[str, ToolReport | BodyReport]]:
+        """When they were seen [s], and all by name; of a body whose name a tool has, too, with a prefix."""
         last = self._last()
         if last is None:
-            return {}
+            return 0.0, {}
         tools = {report.name: report for report in last.tools}
-        return tools | {f"bodies/{body.name}" if body.name in tools else body.name: body for body in last.bodies}
+        return last.time, tools | {f"bodies/{body.name}" if body.name in tools else body.name: body for body in last.bodies}
 
     def _list(self, request, response):
-        response.result, response.entities = self._asked_for(request.filters)
+        _, entities = self._now()
+        response.result, response.entities = _select(entities, request.filters)
         return response
 
     def _list_states(self, request, response):
-        response.result, response.entities = self._asked_for(request.filters)
-        entities = self._entities()
-        response.states = [self._state(entities[name]) for name in response.entities]
+        time, entities = self._now()
+        response.result, response.entities = _select(entities, request.filters)
+        response.states = [self._state(entities[name], time) for name in response.entities]
         return response
 
     def _tell_state(self, request, response):
-        response.result, report = self._find(request.entity)
+        time, entities = self._now()
+        response.result, report = _find(entities, request.entity)
         if report is not None:
-            response.state = self._state(report)
+            response.state = self._state(report, time)
         return response
 
     def _tell_info(self, request, response):
-        response.result, report = self._find(request.entity)
+        response.result, report = _find(self._now()[1], request.entity)
         if report is not None:
             kind = "tool, moved by commands" if isinstance(report, ToolReport) else f"free rigid body of {report.mass:.4g} kg"
             response.info = texts_to_info(_category(report), kind, list(_tags(report)))
         return response
 
     async def _set_state(self, request, response):
-        response.result, report = self._find(request.entity)
+        response.result, report = _find(self._now()[1], request.entity)
         if report is None:
             return response
         if isinstance(report, BodyReport):
@@ -97,6 +102,8 @@ class EntityServices:
             response.result = unsupported(f"'{request.entity}' is a tool; only its pose can be set (set_pose)")
         elif not getattr(request, "set_pose", True):  # the first versions have no such flags
             response.result = failed("nothing is to be set; set_pose is false")
+        elif self._node.refusal:
+            response.result = wrong_state(self._node.refusal)
         else:
             response.result = await self._go(report.name, request.state)
         return response
@@ -126,38 +133,13 @@ class EntityServices:
             self._simulation.reject(error)
             raise error
 
-    def _find(self, name: str):
-        """A result, and the entity if there is one of this name."""
-        report = self._entities().get(name)
-        if report is None:
-            return msg.Result(result=msg.Result.RESULT_NOT_FOUND, error_message=_unknown(name, self._entities())), None
-        return succeeded(), report
-
-    def _asked_for(self, filters):
-        """A result, and the names of the entities that pass."""
-        asked = filters_to_asked(filters)
-        if asked.bounded:
-            return unsupported("filters.bounds: entities cannot be selected by region"), []
-        try:
-            pattern = NamePattern(asked.pattern)
-        except PatternError as error:
-            return failed(f"filters.filter: {error}"), []
-        some = all if asked.all_tags else any
-        return succeeded(), [
-            name
-            for name, report in self._entities().items()
-            if pattern.found_in(name)
-            and (not asked.categories or _category(report) in asked.categories)
-            and (not asked.tags or some(tag in _tags(report) for tag in asked.tags))
-        ]
-
-    def _state(self, report: ToolReport | BodyReport):
+    def _state(self, report: ToolReport | BodyReport, time: float):
         velocity = report.velocity
         if isinstance(report, BodyReport):
             # Told is that of the centre of mass.
             model = next(model for model in self._simulation.world.assembly.bodies if model.body.name == report.name)
             velocity = velocity - np.cross(report.spin, rotation.rotate(report.orientation, model.shape.middle))
-        return report_to_state(report, velocity, self._last().time, self._frames.root)
+        return report_to_state(report, velocity, time, self._frames.root)
 
 
 def succeeded():
@@ -173,6 +155,38 @@ def failed(why: str):
 def unsupported(why: str):
     """Never done here."""
     return msg.Result(result=msg.Result.RESULT_FEATURE_UNSUPPORTED, error_message=why)
+
+
+def wrong_state(why: str):
+    """Done, but not in this state."""
+    return msg.Result(result=msg.Result.RESULT_INCORRECT_STATE, error_message=why)
+
+
+def _find(entities: dict[str, ToolReport | BodyReport], name: str):
+    """A result, and the entity if there is one of this name."""
+    report = entities.get(name)
+    if report is None:
+        return msg.Result(result=msg.Result.RESULT_NOT_FOUND, error_message=_unknown(name, entities)), None
+    return succeeded(), report
+
+
+def _select(entities: dict[str, ToolReport | BodyReport], filters):
+    """A result, and the names of the entities that pass."""
+    asked = filters_to_asked(filters)
+    if asked.bounded:
+        return unsupported("filters.bounds: entities cannot be selected by region"), []
+    try:
+        pattern = NamePattern(asked.pattern)
+    except PatternError as error:
+        return failed(f"filters.filter: {error}"), []
+    some = all if asked.all_tags else any
+    return succeeded(), [
+        name
+        for name, report in entities.items()
+        if pattern.found_in(name)
+        and (not asked.categories or _category(report) in asked.categories)
+        and (not asked.tags or some(tag in _tags(report) for tag in asked.tags))
+    ]
 
 
 def _category(report: ToolReport | BodyReport) -> int:

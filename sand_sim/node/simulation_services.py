@@ -14,7 +14,7 @@ from sand_sim.border import Observation
 from sand_sim.frames import FrameTree
 from sand_sim.node.connections import Connections
 from sand_sim.node.entity_services import FEATURES as ENTITY_FEATURES
-from sand_sim.node.entity_services import EntityServices, failed, succeeded, unsupported
+from sand_sim.node.entity_services import EntityServices, failed, succeeded, unsupported, wrong_state
 from sand_sim.node.services import Services
 from sand_sim.simulation import Simulation
 
@@ -60,7 +60,7 @@ class SimulationServices:
         connections.service(srv.ResetSimulation, "~/reset_simulation", self._reset)
         connections.service(srv.StepSimulation, "~/step_simulation", self._step)
         connections.action(action.SimulateSteps, "~/simulate_steps", self._simulate_steps, lambda _: CancelResponse.ACCEPT)
-        EntityServices(connections, services, simulation, frames, last)
+        EntityServices(node, connections, services, simulation, frames, last)
 
     def _tell_features(self, _, response):
         told = (
@@ -95,7 +95,7 @@ class SimulationServices:
             code = srv.SetSimulationState.Response.INCORRECT_TRANSITION
             response.result = msg.Result(result=code, error_message=f"state {target} cannot be asked for")
         elif self._node.refusal and target != states.STATE_QUITTING:
-            response.result = _wrong_state(self._node.refusal)
+            response.result = wrong_state(self._node.refusal)
         else:
             response.result = await self._enter(target)
         return response
@@ -120,7 +120,7 @@ class SimulationServices:
         if request.scope not in (scopes.SCOPE_DEFAULT, both, both | scopes.SCOPE_SPAWNED, scopes.SCOPE_ALL):
             response.result = unsupported("time and state are only reset together: SCOPE_DEFAULT, SCOPE_ALL, or both bits")
         elif self._node.refusal:
-            response.result = _wrong_state(self._node.refusal)
+            response.result = wrong_state(self._node.refusal)
         else:
             self._stepping = None
             response.result = _result(*await self._services.outcome(self._simulation.reset))
@@ -154,7 +154,7 @@ class SimulationServices:
             goes_on: asked before each frame and after the last with the number of frames done, whether to do more.
         """
         if self._node.refusal:
-            return _wrong_state(self._node.refusal)
+            return wrong_state(self._node.refusal)
         if not self._simulation.paused:
             return failed("the simulation is not paused; pause it first")
         if self._stepping is not None:
@@ -178,7 +178,3 @@ class SimulationServices:
 
 def _result(good: bool, told: str):
     return succeeded() if good else failed(told)
-
-
-def _wrong_state(why: str):
-    return msg.Result(result=msg.Result.RESULT_INCORRECT_STATE, error_message=why)

@@ -251,6 +251,7 @@ def test_action_is_cancelled_interrupted_and_one_at_a_time(run, client, package)
     assert end.status == ABORTED
     assert node.ask("StepSimulation", steps=1).result.result == results.RESULT_INCORRECT_STATE
     assert node.enter(states.STATE_PLAYING) == results.RESULT_INCORRECT_STATE
+    assert node.ask("SetEntityState", entity="plate", set_pose=True).result.result == results.RESULT_INCORRECT_STATE
     for label in ("cleanup", "configure", "activate"):
         assert change(client, label)
     assert node.ask("StepSimulation", steps=1).result.result == results.RESULT_OK
