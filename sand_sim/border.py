@@ -273,7 +273,7 @@ class Observation:
         time: simulated [s].
         steps: since the start.
         grains: all grains.
-        tools: one report per tool, in the order of the scene.
+        tools: one report per tool, in the order of their names.
         walls: one report per wall, in the order of the scene, terrains last.
         health: error indicators.
         bodies: one report per free rigid body of the scene that is in the domain.

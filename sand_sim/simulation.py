@@ -157,13 +157,7 @@ class Simulation:
 
     def change(self, act: Callable[[], Any]) -> Future:
         """As ``request``, and the world is shown when it has been changed."""
-
-        def act_and_show() -> Any:
-            result = act()
-            self._on_frame(self.world.observe())
-            return result
-
-        return self.request(act_and_show)
+        return self.request(lambda: (act(), self._on_frame(self.world.observe()))[0])
 
     def save_state(self, path: Path) -> Future:
         """Write the state to a file; the future gives the path once it is on the disk, or ``CheckpointError``."""

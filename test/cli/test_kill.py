@@ -134,7 +134,7 @@ def test_refusals(tmp_path):
     for words, reason in (
         (["--resume"], "--checkpoint FOLDER"),
         (["--checkpoint", "small.yaml"], "checkpoint folder small.yaml: File exists"),
-        (["--checkpoint", "some_states", "--checkpoint-period", "-1"], "--checkpoint-period"),
+        (["--checkpoint", "some_states", "--checkpoint-period", "-1"], "period of checkpoints: must be 0 s or more"),
     ):
         process = sand_sim(tmp_path, "run", scene, *words)
         _, errors = process.communicate(timeout=PATIENCE)

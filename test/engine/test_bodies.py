@@ -235,7 +235,7 @@ def test_body_that_leaves_is_retired_whole(make_bodies):
     )
     world.step(round(0.4 / world.time_step))
     observation = world.observe()
-    assert observation.grains.identity.tolist() == [1]
+    assert observation.grains.identity.tolist() == [0], "bodies are numbered in the order of their names"
     assert len(observation.spheres) == 2
     assert [body.name for body in observation.bodies] == ["kept"]
     assert observation.health.retired == 1
