@@ -74,7 +74,6 @@ def _rescale(state: dict[str, np.ndarray], share: float, grains: int) -> None:
             place[here, :3], remainder[here] = np.rint(exact), exact - np.rint(exact)
             if kind == "grains":
                 place[here, 3] = np.maximum(np.rint(place[here, 3] * share), 1)
-    state["skin.width"] *= share
     if "plungers.states" in state:
         state["plungers.states"]["shift"] *= share
 

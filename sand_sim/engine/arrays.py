@@ -104,6 +104,8 @@ class DemArrays:
         own = {array.dtype: wp.zeros_like(array) for array in (self.grains.motion, self.grains.remainder)}
         others = {array.dtype for array in self.grains.sorted_arrays} - set(own)
         self.spare = own | {dtype: Lender(own[precision.vec4], device).lend(dtype, number) for dtype in others}
+        # What grains are allowed is asked for only while lists are made, when all that is idle.
+        self.allowed = Lender(own[precision.vec4], device).lend(precision.whole, number)
         # What an observer sees lies in scratch that is idle between neighbour searches.
         self.seen_motion, self.seen_spin = self.grains.motion, self.grains.spin
         if recipe.integrator == VERLET:

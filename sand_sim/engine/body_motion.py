@@ -90,7 +90,6 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
         quantum: real,
         half_extent: whole3,
         parking: whole,
-        skin: wp.array(dtype=wp.float64),
         starting: wp.array(dtype=int),
         carried_off: wp.array(dtype=wp.float64),
         grains_moved: wp.array(dtype=int),
@@ -175,7 +174,7 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
                     sphere_half_spin[i] = past
                 began = origin[i]
                 moved = vec3(real(u - began[0]), real(v - began[1]), real(w - began[2]))
-                if real(4.0) * wp.dot(moved, moved) > real(skin[0] * skin[0]):
+                if wp.dot(moved, moved) > real(began[3]) * real(began[3]):
                     grains_moved[0] = 1
 
     return move_bodies

@@ -74,7 +74,6 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
         quantum: real,
         half_extent: whole3,
         parking: whole,
-        skin: wp.array(dtype=wp.float64),
         starting: wp.array(dtype=int),
         carried_off: wp.array(dtype=wp.float64),
         grains_moved: wp.array(dtype=int),
@@ -161,7 +160,7 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
             place[i] = whole4(x, y, z, here[3])
             start = origin[i]
             moved = vec3(real(x - start[0]), real(y - start[1]), real(z - start[2]))
-            if real(4.0) * wp.dot(moved, moved) > real(skin[0] * skin[0]):
+            if wp.dot(moved, moved) > real(start[3]) * real(start[3]):
                 grains_moved[0] = 1
 
     return move_grains

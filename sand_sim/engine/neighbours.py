@@ -33,7 +33,7 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
     own level and at all cells around it in coarser levels. The first pass counts, the second (``filling``) writes the list.
     """
     precision, history, bodies = recipe.precision, recipe.history, recipe.bodies
-    real, whole3, whole4 = precision.real, precision.whole3, precision.whole4
+    real, whole, whole3, whole4 = precision.real, precision.whole, precision.whole3, precision.whole4
     memory_vector, swapped = memory_type(recipe.contact, precision), build_swapped(recipe)
     level = level_type(precision)
     level_of, cell_of = cell_functions(precision)
@@ -47,7 +47,7 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         levels: wp.array(dtype=level),
         lowest: wp.array(dtype=whole3),
         cell_starts: wp.array(dtype=int),
-        skin: wp.array(dtype=wp.float64),
+        allowed: wp.array(dtype=whole),
         across: real,
         member: wp.array(dtype=int),
         body_of: wp.array(dtype=int),
@@ -65,7 +65,7 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
             i = sure(item)
             here = place[i]
             low = lowest[0]
-            gap = real(skin[0]) + across
+            gap = real(here[3] + allowed[i]) + across
             found = int(0)
             if wp.static(filling):
                 found = starts[i]
@@ -94,7 +94,7 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                         dx = real(here[0] - there[0])
                         dy = real(here[1] - there[1])
                         dz = real(here[2] - there[2])
-                        reach = real(here[3] + there[3]) + gap
+                        reach = real(there[3] + allowed[j]) + gap
                         if dx * dx + dy * dy + dz * dz < reach * reach:
                             apart = bool(True)
                             if wp.static(bodies):

@@ -1,64 +1,152 @@
-"""How far grains may move before the contact lists are made anew, chosen while a world runs.
+"""How far each grain may move before the contact lists are made anew, chosen while a world runs.
 
-A wider skin makes lists that last longer but hold more pairs that do not touch. Let a search cost as much as, in ``_SEARCH``
-steps, the useless pairs in a skin of one radius r do. With the fastest grain moving by t a step, a skin s costs
-``_SEARCH 2 t/s + s/r``, least at ``s = sqrt(2 _SEARCH r t)``, when a list lasts for ``_SEARCH r/s`` steps. How long lists last
-tells t.
+A pair is listed if the two come within reach when each has moved as far as it is allowed to. Grains that have moved little since
+the lists were made are allowed little, so that a bed at rest around a moving tool lists hardly a pair that does not touch. A
+search costs as much as, in ``_SEARCH`` steps, the useless pairs of grains that are allowed half a radius r each. With grains that
+move by t a step on the mean lists for S steps cost ``_SEARCH/S + 2 _SPARE t S/r``, least at ``S = sqrt(_SEARCH r/(2 _SPARE t))``.
 """
+
+from functools import cache
 
 import warp as wp
 
-from sand_sim.engine.kernel import kernel
+from sand_sim.engine.count import count_of
+from sand_sim.engine.kernel import kernel, sure
+from sand_sim.precision import Precision
 
 _SEARCH = 5.0  # measured: benchmarks/profile.py
-_NARROWEST, _FIRST = 0.1, 0.4  # of the widest skin
-_TOO_LONG = 4.0  # a list that has lasted this many times as long as it should has a skin at least twice as wide as it should
+_SPARE = 1.5  # a grain may go this many times as far as it would at its last pace
+_LEAST, _FIRST = 0.1, 0.4  # of the widest allowance, of grains at rest and in the first lists
+_FIRST_LIFETIME = 50.0  # steps, while nothing is known of the motion
+_TOO_LONG = 4.0  # lists that have lasted this many times as long as they should are too wide
+_SAMPLES = 1024  # grains whose pace is looked at
 
 
 class Skin:
-    """The skin now.
+    """What grains are allowed now.
 
     Attributes:
-        widest: what the cells are made for [quantum].
-        radius: of a grain, on the mean [quantum]; 0 for a skin that stays as it is.
-        width: how far two grains may approach each other until the lists are made anew, float64, shape (1,) [quantum].
-        renewed_at: step at which they were made, int64, shape (1,).
+        radius: of a grain, on the mean [quantum]; 0 for an allowance that stays as it is.
+        widest: twice what a grain is allowed at most, which the cells are made for, float64, shape (1,) [quantum].
+        lifetime: steps that the lists shall last for, float64, shape (1,).
+        pace: factor from how far a grain has moved to what it is allowed, and the least, float64, shape (2,) [1], [quantum].
+        renewed_at: step at which the lists were made, int64, shape (1,).
     """
 
     def __init__(self, widest: float, radius: float, device: str):
-        self.widest, self.radius = widest, radius
-        self.width = wp.full(1, _FIRST * widest if radius else widest, dtype=wp.float64, device=device)
+        self.radius = radius
+        self.widest = wp.full(1, widest, dtype=wp.float64, device=device)
+        self.lifetime = wp.full(1, _FIRST_LIFETIME, dtype=wp.float64, device=device)
+        self.pace = wp.zeros(2, dtype=wp.float64, device=device)
         self.renewed_at = wp.zeros(1, dtype=wp.int64, device=device)
 
 
+@cache
+def build_set_pace(precision: Precision) -> wp.Kernel:
+    """Kernel that chooses how long the lists about to be made shall last."""
+    whole4 = precision.whole4
+
+    @kernel
+    def set_pace(
+        spans: wp.array(dtype=int),
+        place: wp.array(dtype=whole4),
+        origin: wp.array(dtype=whole4),
+        came_from: wp.array(dtype=int),
+        radius: wp.float64,
+        widest: wp.array(dtype=wp.float64),
+        steps_done: wp.array(dtype=wp.int64),
+        renewed_at: wp.array(dtype=wp.int64),
+        lifetime: wp.array(dtype=wp.float64),
+        pace: wp.array(dtype=wp.float64),
+    ):
+        steps = steps_done[0] - renewed_at[0]
+        most = wp.float64(0.5) * widest[0]
+        if radius == wp.float64(0.0):
+            pace[1] = most
+        elif steps <= wp.int64(0):
+            pace[1] = wp.float64(wp.static(_FIRST)) * most
+        else:
+            number = count_of(spans)
+            every = wp.max(number / wp.static(_SAMPLES), 1)
+            travel = wp.float64(0.0)
+            for k in range(number / every):
+                i = k * every
+                here = place[i]
+                was = origin[came_from[i]]
+                moved = wp.vec3d(wp.float64(here[0] - was[0]), wp.float64(here[1] - was[1]), wp.float64(here[2] - was[2]))
+                travel += wp.min(wp.length(moved), most)
+            travel = travel / (wp.float64(wp.max(number / every, 1)) * wp.float64(steps))
+            best = wp.sqrt(wp.float64(wp.static(0.5 * _SEARCH / _SPARE)) * radius / wp.max(travel, wp.float64(1.0e-12)))
+            lifetime[0] = best
+            pace[0] = wp.float64(wp.static(_SPARE)) * best / wp.float64(steps)
+            pace[1] = wp.float64(wp.static(_LEAST)) * most
+
+    return set_pace
+
+
+@cache
+def build_allow(precision: Precision) -> wp.Kernel:
+    """Kernel for what each grain is allowed [quantum]."""
+    real, vec3, whole, whole4 = precision.real, precision.vec3, precision.whole, precision.whole4
+
+    @kernel
+    def allow(
+        lane: int,
+        spans: wp.array(dtype=int),
+        stride: int,
+        place: wp.array(dtype=whole4),
+        origin: wp.array(dtype=whole4),
+        came_from: wp.array(dtype=int),
+        widest: wp.array(dtype=wp.float64),
+        pace: wp.array(dtype=wp.float64),
+        allowed: wp.array(dtype=whole),
+    ):
+        for item in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            i = sure(item)
+            here = place[i]
+            was = origin[sure(came_from[i])]
+            moved = vec3(real(here[0] - was[0]), real(here[1] - was[1]), real(here[2] - was[2]))
+            far = real(pace[0]) * wp.length(moved)
+            allowed[i] = whole(wp.clamp(far, real(pace[1]), real(wp.float64(0.5) * widest[0])))
+
+    return allow
+
+
+@cache
+def build_remember(precision: Precision) -> wp.Kernel:
+    """Kernel that keeps where each grain is when the lists are made, with what it is allowed as the fourth number."""
+    whole, whole4 = precision.whole, precision.whole4
+
+    @kernel
+    def remember(
+        lane: int,
+        spans: wp.array(dtype=int),
+        stride: int,
+        place: wp.array(dtype=whole4),
+        allowed: wp.array(dtype=whole),
+        origin: wp.array(dtype=whole4),
+    ):
+        for item in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            i = sure(item)
+            here = place[i]
+            origin[i] = whole4(here[0], here[1], here[2], allowed[i])
+
+    return remember
+
+
 @kernel
-def adapt_skin(
-    radius: wp.float64,
-    widest: wp.float64,
-    steps_done: wp.array(dtype=wp.int64),
-    width: wp.array(dtype=wp.float64),
-    renewed_at: wp.array(dtype=wp.int64),
-):
-    """Choose the skin of the lists about to be made."""
-    steps = steps_done[0] - renewed_at[0]
+def begin_lifetime(steps_done: wp.array(dtype=wp.int64), renewed_at: wp.array(dtype=wp.int64)):
+    """Note when the lists were made."""
     renewed_at[0] = steps_done[0]
-    if steps > wp.int64(0):
-        travel = wp.float64(0.5) * width[0] / wp.float64(steps)
-        best = wp.sqrt(wp.float64(2.0 * wp.static(_SEARCH)) * radius * travel)
-        width[0] = wp.clamp(best, wp.float64(wp.static(_NARROWEST)) * widest, widest)
 
 
 @kernel
-def narrow_skin(
-    radius: wp.float64,
-    widest: wp.float64,
+def end_lifetime(
     steps_done: wp.array(dtype=wp.int64),
-    width: wp.array(dtype=wp.float64),
     renewed_at: wp.array(dtype=wp.int64),
+    lifetime: wp.array(dtype=wp.float64),
     grains_moved: wp.array(dtype=int),
 ):
-    """Have lists made anew whose skin has turned out to be too wide."""
-    steps = wp.float64(steps_done[0] - renewed_at[0])
-    too_long = wp.float64(wp.static(_TOO_LONG * _SEARCH)) * radius / width[0]
-    if steps > too_long and width[0] > wp.float64(wp.static(_NARROWEST)) * widest:
+    """Have lists made anew that have turned out to be too wide."""
+    if wp.float64(steps_done[0] - renewed_at[0]) > wp.float64(wp.static(_TOO_LONG)) * lifetime[0]:
         grains_moved[0] = 1

@@ -10,7 +10,7 @@ from sand_sim.engine import body_motion, finish, motion, neighbours, pair_forces
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_lay_cells
 from sand_sim.engine.contact_list import ContactList, record_count, record_fill
-from sand_sim.engine.skin import adapt_skin, narrow_skin
+from sand_sim.engine.skin import begin_lifetime, build_allow, build_remember, build_set_pace, end_lifetime
 from sand_sim.engine.smooth_tools import arguments_of, record_carrying, record_keeping, record_touching
 from sand_sim.engine.sorting import record_sort
 
@@ -108,15 +108,16 @@ def list_stage(arrays: DemArrays, recorder) -> None:
     """Find what each grain may touch among grains and walls; count first, so that nothing is written unless all of it fits."""
     grains, flags, cells = arrays.grains, arrays.flags, arrays.cells
     active, skin, across = grains.active, arrays.skin, arrays.setting.reach / arrays.lattice.quantum
+    precision = arrays.recipe.precision
 
     def pairs(filling):
-        inputs = [grains.place, cells.levels, cells.low, arrays.in_cells.starts, skin.width, across]
+        inputs = [grains.place, cells.levels, cells.low, arrays.in_cells.starts, arrays.allowed, across]
         inputs += [grains.member, arrays.bodies.body_of if arrays.bodies else None]
         inputs += _list_arguments(arrays, arrays.pair_list)
         recorder.each(neighbours.build_search(arrays.recipe, filling), active, inputs)
 
     def walls(filling):
-        inputs = [grains.place, arrays.walls, arrays.plunger_states, skin.width, across]
+        inputs = [grains.place, arrays.walls, arrays.plunger_states, skin.widest, across]
         inputs += _list_arguments(arrays, arrays.wall_list)
         recorder.each(surface_contacts.build_surface_search(arrays.recipe, filling), active, inputs)
 
@@ -129,13 +130,16 @@ def list_stage(arrays: DemArrays, recorder) -> None:
             recorder.once(finish.raise_flag, [flags.tools_moved])
         else:
             recorder.each(neighbours.number_anew, active, [grains.came_from])
-        recorder.each(neighbours.build_put_back(grains.place.dtype), active, [grains.place, grains.origin])
+        recorder.each(build_remember(precision), active, [grains.place, arrays.allowed, grains.origin])
+        recorder.once(begin_lifetime, [flags.steps_done, skin.renewed_at], wait=False)
         if arrays.plungers:
             recorder.once(plungers.forget_plunger_travel, [arrays.plungers.states], wait=False)
         recorder.once(finish.lower_flag, [flags.grains_moved])
 
-    if skin.radius:
-        recorder.once(adapt_skin, [skin.radius, skin.widest, flags.steps_done, skin.width, skin.renewed_at])
+    moved, paced = [grains.place, grains.origin, grains.came_from], [skin.lifetime, skin.pace]
+    timed = [skin.radius, skin.widest, flags.steps_done, skin.renewed_at]
+    recorder.once(build_set_pace(precision), [active.spans, *moved, *timed, *paced])
+    recorder.each(build_allow(precision), active, [*moved, skin.widest, skin.pace, arrays.allowed])
     record_count(recorder, arrays.pair_list, active, partial(pairs, False), flags)
     if arrays.walls:
         record_count(recorder, arrays.wall_list, active, partial(walls, False), flags)
@@ -148,6 +152,7 @@ def tool_list_stage(arrays: DemArrays, recorder) -> None:
 
     def search(filling):
         inputs = [
+            grains.place,
             grains.origin,
             tools.shapes,
             tools.states,
@@ -155,7 +160,7 @@ def tool_list_stage(arrays: DemArrays, recorder) -> None:
             tools.particles,
             *arguments_of(tools.smooth),
         ]
-        inputs += [arrays.lattice.quantum, arrays.skin.width, arrays.setting.reach, *_list_arguments(arrays, arrays.tool_list)]
+        inputs += [arrays.lattice.quantum, arrays.skin.widest, arrays.setting.reach, *_list_arguments(arrays, arrays.tool_list)]
         recorder.each(tool_contacts.build_tool_search(arrays.recipe, filling), grains.active, inputs)
 
     def fill():
@@ -225,7 +230,6 @@ def move_stage(arrays: DemArrays, recorder) -> None:
             lattice.quantum,
             precision.whole3(*lattice.half_extent.tolist()),
             lattice.end,
-            arrays.skin.width,
             arrays.flags.starting,
             arrays.carried_off,
             arrays.flags.grains_moved,
@@ -243,7 +247,7 @@ def body_stage(arrays: DemArrays, recorder) -> None:
     inputs += [grains.place, grains.motion, grains.spin, grains.half_motion, grains.half_spin, grains.origin]
     inputs += [arrays.felt_force, arrays.felt_torque]
     inputs += [precision.vec3(*setting.gravity), setting.dt, lattice.quantum]
-    inputs += [precision.whole3(*lattice.half_extent.tolist()), lattice.end, arrays.skin.width]
+    inputs += [precision.whole3(*lattice.half_extent.tolist()), lattice.end]
     inputs += [flags.starting, arrays.carried_off, flags.grains_moved, flags.fault]
     recorder.each(body_motion.build_move_bodies(arrays.recipe), bodies.count, inputs)
 
@@ -252,15 +256,15 @@ def finish_stage(arrays: DemArrays, recorder) -> None:
     """Sum the wrenches, move the plungers on, count the step, move the tools on."""
     flags, skin, tools, dt = arrays.flags, arrays.skin, arrays.tools, arrays.setting.dt
     if skin.radius:
-        watched = [skin.radius, skin.widest, flags.steps_done, skin.width, skin.renewed_at, flags.grains_moved]
-        recorder.once(narrow_skin, watched, wait=False)
+        watched = [flags.steps_done, skin.renewed_at, skin.lifetime, flags.grains_moved]
+        recorder.once(end_lifetime, watched, wait=False)
     if tools:
         recorder.once(finish.sum_wrenches, [arrays.tool_list.pairs.spans, arrays.wrench_blocks, tools.wrench], wait=False)
         inputs = [dt, tools.tracks, flags.steps_done, tools.wrench, tools.impulse, tools.work]
         recorder.once(finish.sum_impulses, inputs, wait=False)
     if arrays.plungers:
         moved = [arrays.wall_list.pairs.spans, arrays.plunger_blocks, arrays.plungers.drives, arrays.plungers.states]
-        moved += [arrays.plungers.engaged, dt, 1.0 / arrays.lattice.quantum, arrays.skin.width, flags.grains_moved]
+        moved += [arrays.plungers.engaged, dt, 1.0 / arrays.lattice.quantum, arrays.skin.widest, flags.grains_moved]
         recorder.once(plungers.advance_plungers, moved, wait=False)
     ending = [flags.steps_done, flags.steps_left, flags.starting, flags.fault, flags.running]
     recorder.once(finish.finish_step, ending, wait=not tools)
@@ -283,7 +287,7 @@ def place_tools(arrays: DemArrays, recorder) -> None:
             setting.dt,
             arrays.flags.steps_done,
             tools.travelled,
-            arrays.skin.width,
+            arrays.skin.widest,
             arrays.flags.tools_moved,
         ],
     )

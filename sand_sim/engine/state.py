@@ -72,7 +72,7 @@ def _whole_arrays(arrays: DemArrays) -> dict[str, wp.array]:
     )
     found = {f"grains.{name}": getattr(grains, name) for name in names}
     found |= {f"flags.{name}": getattr(flags, name) for name in ("grains_moved", "tools_moved", "starting", "steps_done")}
-    found |= {f"skin.{name}": getattr(arrays.skin, name) for name in ("width", "renewed_at")}
+    found |= {f"skin.{name}": getattr(arrays.skin, name) for name in ("lifetime", "renewed_at")}
     found |= {f"{name}.starts": contacts.starts for name, contacts in arrays.lists.items()}
     found["met.starts"] = arrays.met.starts
     if arrays.bodies:

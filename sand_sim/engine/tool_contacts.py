@@ -55,6 +55,7 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         lane: int,
         spans: wp.array(dtype=int),
         stride: int,
+        place: wp.array(dtype=whole4),
         origin: wp.array(dtype=whole4),
         shapes: wp.array(dtype=shape_type),
         states: wp.array(dtype=state_type),
@@ -85,7 +86,7 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                 shape = shapes[tool]
                 state = states[tool]
                 away = from_tool(here, state, quantum)
-                reach = (real(here[3]) + real(skin[0])) * quantum + shape.radius + across
+                reach = (real(place[i][3] + here[3]) + real(wp.float64(0.5) * skin[0])) * quantum + shape.radius + across
                 farthest = shape.extent + reach
                 if wp.dot(away, away) > farthest * farthest:
                     continue
