@@ -67,8 +67,8 @@ def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
     spheres = len(assembly.table)
     cost = measure_cost(assembly) if measure else None
     stages = solver.stages
-    kept = {s.name: "when a grain has moved half the skin" for s in stages.listing}
-    kept |= {s.name: "when a tool has moved half the skin" for s in stages.tool_listing}
+    kept = {s.name: "when a grain has moved as far as its skin allows" for s in stages.listing}
+    kept |= {s.name: "when a tool has moved as far as its skin allows" for s in stages.tool_listing}
     kept |= {s.name: "every step" for s in stages.step}
     return Plan(
         grains=assembly.table.grains,

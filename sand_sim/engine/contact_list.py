@@ -1,7 +1,8 @@
 """Which spheres may touch what: lists with a skin, one each for grain pairs, grains at walls and grains at tools.
 
-A list holds, grain after grain, the partners within reach. It stays valid until something has moved half the skin. When it is
-rebuilt, the history of contacts that go on is carried over, also when the grains have been renumbered meanwhile.
+A list holds, grain after grain, the partners within reach. It stays valid until something has moved as far as it is allowed to (see
+``skin.py``). When it is rebuilt, the history of contacts that go on is carried over, also when the grains have been renumbered
+meanwhile.
 """
 
 from functools import cache

@@ -33,7 +33,7 @@ class Stages:
     """The stages that a scene needs.
 
     Attributes:
-        listing: when a grain has moved half the skin.
+        listing: when a grain has moved as far as it is allowed to.
         tool_listing: when a tool has.
         step: at every step.
     """
