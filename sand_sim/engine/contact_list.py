@@ -1,8 +1,7 @@
 """Which spheres may touch what: lists with a skin, one each for grain pairs, grains at walls and grains at tools.
 
-A list holds, grain after grain, the partners within reach. It stays valid until something has moved as far as it is allowed to (see
-``skin.py``). When it is rebuilt, the history of contacts that go on is carried over, also when the grains have been renumbered
-meanwhile.
+A list holds, grain after grain, the partners within reach. It stays valid until something has moved as far as it may, see
+``skin.py``. When it is rebuilt, the history of contacts that go on is carried over, also when the grains have been renumbered.
 """
 
 from functools import cache

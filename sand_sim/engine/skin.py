@@ -61,6 +61,7 @@ def build_set_pace(precision: Precision) -> wp.Kernel:
     ):
         steps = steps_done[0] - renewed_at[0]
         most = wp.float64(0.5) * widest[0]
+        pace[0] = wp.float64(0.0)
         if radius == wp.float64(0.0):
             pace[1] = most
         elif steps <= wp.int64(0):

@@ -210,32 +210,13 @@ def tool_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
 def move_stage(arrays: DemArrays, recorder) -> None:
     """Advance all grains."""
     grains, lattice, setting, precision = arrays.grains, arrays.lattice, arrays.setting, arrays.recipe.precision
-    recorder.each(
-        motion.build_move_grains(arrays.recipe, walls=bool(arrays.walls), tools=bool(arrays.tools)),
-        grains.active,
-        [
-            grains.place,
-            grains.remainder,
-            grains.motion,
-            grains.spin,
-            grains.half_motion,
-            grains.half_spin,
-            grains.origin,
-            *gathered(arrays),
-            grains.member,
-            arrays.felt_force,
-            arrays.felt_torque,
-            precision.vec3(*setting.gravity),
-            setting.dt,
-            lattice.quantum,
-            precision.whole3(*lattice.half_extent.tolist()),
-            lattice.end,
-            arrays.flags.starting,
-            arrays.carried_off,
-            arrays.flags.grains_moved,
-            arrays.flags.fault,
-        ],
-    )
+    inputs = [grains.place, grains.remainder, grains.motion, grains.spin, grains.half_motion, grains.half_spin, grains.origin]
+    inputs += [*gathered(arrays), grains.member, arrays.felt_force, arrays.felt_torque]
+    inputs += [precision.vec3(*setting.gravity), setting.dt, lattice.quantum]
+    inputs += [precision.whole3(*lattice.half_extent.tolist()), lattice.end]
+    inputs += [arrays.flags.starting, arrays.carried_off, arrays.flags.grains_moved, arrays.flags.fault]
+    kernel = motion.build_move_grains(arrays.recipe, walls=bool(arrays.walls), tools=bool(arrays.tools))
+    recorder.each(kernel, grains.active, inputs)
 
 
 def body_stage(arrays: DemArrays, recorder) -> None:
