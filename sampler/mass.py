@@ -24,18 +24,19 @@ class MassProperties:
     axes: np.ndarray
 
 
-def integrate(triangles: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+def integrate(triangles: np.ndarray, share: np.ndarray | float = 1.0) -> tuple[float, np.ndarray, np.ndarray]:
     """Volume, centre and inertia per unit density by the divergence theorem, exact for a closed surface.
 
     Args:
         triangles: outward, shape (n, 3, 3) [m].
+        share: that counts of each, where several lie on one another, shape (n,) [1].
 
     Returns:
         Volume [m^3], centre, shape (3,) [m], inertia about the centre, shape (3, 3) [m^5].
     """
     origin = triangles.mean(axis=(0, 1))
     a, b, c = np.moveaxis(triangles - origin, 1, 0)
-    volumes = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0  # of tetrahedra with the origin
+    volumes = share * np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0  # of tetrahedra with the origin
     volume = float(volumes.sum())
     total = a + b + c
     first = (volumes @ total) / 4.0

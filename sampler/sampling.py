@@ -11,7 +11,7 @@ from sampler.inset import inset_particles
 from sampler.mass import integrate, is_physical
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
 from sampler.sheets import closed_triangles
-from sampler.skin import Skin, free_triangles
+from sampler.skin import Skin, coincidence, free_triangles
 from sampler.spreading import Observer, lattice_spacing, measure_evenness, particle_count, spread_particles
 from sampler.surface import Surface
 
@@ -168,7 +168,9 @@ def _mass(closed, free, parent, around, warnings) -> tuple[float, np.ndarray, np
     if np.all(whole):
         volume, centre, inertia = integrate(closed)
     else:
-        volume, centre, inertia = integrate(free)
+        normals = np.cross(free[:, 1] - free[:, 0], free[:, 2] - free[:, 0])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+        volume, centre, inertia = integrate(free, 1.0 / coincidence(free.mean(axis=1), normals, around))
         warnings.append("parts of the surface are buried in others; volume and inertia are those of the union, to about 0.1 %")
     low, high = closed.min(axis=(0, 1)), closed.max(axis=(0, 1))
     if is_physical(volume, centre, inertia, low, high):

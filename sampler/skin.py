@@ -50,6 +50,7 @@ def free_triangles(
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
     if _free(places, normals, around, two_sided)[0].all():
         return triangles, parent
+    coincide = np.any(coincidence(places, normals, around) > 1)
     kept, parents, mixed = [], [], 0
     for depth in range(_DEEPEST + 1):
         normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -62,6 +63,11 @@ def free_triangles(
         rim = np.concatenate([large, 0.5 * (large + np.roll(large, -1, axis=1))], axis=1)  # corners and midpoints
         rim = 0.98 * rim + 0.02 * centre[open_, None] + _STEP * around.unit * normal[open_, None]
         same = (np.abs(around.winding(rim.reshape(-1, 3))) < 0.5).reshape(-1, 6) == before[open_, None]
+        if coincide and len(rim):  # where two surfaces part, pieces end, so that each is covered as often all over
+            behind = rim - 2.0 * _STEP * around.unit * normal[open_, None]
+            depths = np.rint(np.abs(around.winding(behind.reshape(-1, 3)))).reshape(-1, 6)
+            middle = np.rint(np.abs(around.winding(centre[open_] - _STEP * around.unit * normal[open_])))
+            same &= depths == middle[:, None]
         # A large triangle may hold an island; only small ones are believed by their rims.
         cut = np.zeros(len(triangles), bool)
         cut[open_] = ~same.all(axis=1) | ((edge[open_] > _ISLAND * spacing) & (depth < _SEARCHED))
@@ -73,6 +79,13 @@ def free_triangles(
         if not len(triangles):
             break
     return np.concatenate(kept), np.concatenate(parents)
+
+
+def coincidence(points: np.ndarray, normals: np.ndarray, around: Surface) -> np.ndarray:
+    """How many faces of closed surfaces lie on one another at places of theirs, at least 1, shape (n,) int."""
+    step = _STEP * around.unit * normals
+    before, behind = (np.abs(around.winding(points + side * step)) for side in (1.0, -1.0))
+    return np.maximum(np.rint(behind - before), 1).astype(int)
 
 
 def _free(points: np.ndarray, normals: np.ndarray, around: Surface, two_sided: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -223,3 +223,21 @@ def test_integrals_of_a_tetrahedron():
     assert volume == pytest.approx(a**3 / 6.0, rel=1e-12)
     assert centre == pytest.approx(3 * [a / 4.0], rel=1e-12)
     assert inertia == pytest.approx(np.trace(second) * np.eye(3) - second, rel=1e-9)
+
+
+@pytest.mark.parametrize("shift", [(0.02, 0.0, 0.0), (0.025, 0.01, 0.0), (0.01, 0.01, 0.01)])
+@pytest.mark.parametrize("turn", [0.0, 0.4])
+def test_overlapping_parts_with_faces_in_one_plane_count_once(shift, turn):
+    """As robots' links have them: two boxes of 40 mm whose faces lie on one another over part of their area."""
+    edge, shift = 0.04, np.array(shift)
+    one, other = trimesh.creation.box((edge,) * 3), trimesh.creation.box((edge,) * 3)
+    other.apply_translation(shift)
+    mesh = trimesh.util.concatenate([one, other])
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(turn, (1.0, 2.0, 3.0)))
+    common = np.prod(edge - shift)
+    volume = 2.0 * edge**3 - common
+    first = edge**3 * shift - common * 0.5 * shift  # the common box lies around the middle of both
+    body = sample_body(mesh, 0.003)
+    assert body.volume == pytest.approx(volume, rel=2e-3)
+    centre = trimesh.transformations.rotation_matrix(turn, (1.0, 2.0, 3.0))[:3, :3] @ (first / volume)
+    assert body.centre == pytest.approx(centre, abs=2e-3 * edge)
