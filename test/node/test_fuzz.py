@@ -14,7 +14,7 @@ from geometry_msgs.msg import PoseStamped, TwistStamped
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from node_client import NO_TURN, START
-from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
@@ -163,4 +163,43 @@ def test_ten_megabytes_of_frame_name(client, start_node):
     client.send(START, at=0.02)
     client.wait_for(lambda: client.time > 0.019)
     assert node.simulation.rejected == {"unknown_frame": 1, "not_finite": 1, "zero_quaternion": 1}
+    assert_unharmed(client, node)
+
+
+@pytest.mark.parametrize("examples", [60, pytest.param(1_000, marks=pytest.mark.slow)])
+def test_any_argument_of_a_service(client, start_node, tmp_path, examples):
+    node = start_node(pacing="lockstep", points_rate=0.0, states=str(tmp_path / "states"))
+    client.connect()
+    names = {
+        "spawn_grains": ["position", "radius", "material", "velocity"],
+        "remove_grains": ["id", "low", "high"],
+        "set_tool_mesh": ["tool", "mesh", "scale"],
+        "load_state": ["name"],
+    }
+    text = st.one_of(
+        st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=10),
+        st.sampled_from(["plate", "plate.stl", "/etc/passwd", "../x.stl", "package://x/../../y", "file:///etc/passwd", "sand"]),
+    )
+    whole = st.integers(-(2**63), 2**63 - 1)
+    value = st.one_of(NUMBER, whole, text, st.lists(NUMBER, max_size=9), st.lists(whole, max_size=9), st.booleans())
+    argument = st.sampled_from(sorted(names)).flatmap(
+        lambda service: st.tuples(
+            st.just(service), st.lists(st.tuples(st.sampled_from([*names[service], "other"]), value), max_size=4)
+        )
+    )
+    services = {name: client.node.create_client(SetParametersAtomically, f"/sand_sim/{name}") for name in names}
+    client.wait_for(lambda: all(service.service_is_ready() for service in services.values()))
+
+    @settings(max_examples=examples, **HURRY)
+    @given(argument)
+    def ask(asked):
+        service, arguments = asked
+        parameters = [Parameter(name, value=given).to_parameter_msg() for name, given in arguments]
+        future = services[service].call_async(SetParametersAtomically.Request(parameters=parameters))
+        client.wait_for(future.done)
+        result = future.result().result
+        assert result.reason
+        assert len(result.reason) < 5_000
+
+    ask()
     assert_unharmed(client, node)
