@@ -47,6 +47,7 @@ class ToolInputs:
         self.frames = _fixed_frames(parameters, frames)
         self._fixed = {*parameters["frame_names"], *(frame.name for frame in frames)}
         self._followers: dict[str, str] = {}
+        self._followed: dict[str, float] = {}
         for tool in simulation.world.scene.tools:
             self._connect(connections, tool.name)
         if tf2_msgs.TFMessage is not None:
@@ -103,32 +104,28 @@ class ToolInputs:
         return replace(command, linear=rotation.rotate(turn, command.linear), angular=rotation.rotate(turn, command.angular))
 
     def _hear_frames(self, message, fixed: bool) -> None:
-        told = {}
+        told = set()
         for frame in tf2_msgs.message_to_frames(message, fixed):
             if frame.name in self._fixed:
                 continue  # what the parameters and the robot description fix stays
             try:
                 self.frames.put(frame)
-                told[frame.name] = frame.time
+                told.add(frame.name)
             except CommandError as error:
                 self._simulation.reject(error)
         for tool, name in self._followers.items():
             self._follow(tool, name, told)
 
-    def _follow(self, tool: str, name: str, told: dict[str, float | None]) -> None:
-        """Command the pose of a frame if news concern it."""
-
-        def read() -> ToolPose:
-            return ToolPose(tool, *self.frames.in_root(name, _NO_MOVE, _NO_TURN), time=latest or None)
-
+    def _follow(self, tool: str, name: str, told: set[str]) -> None:
+        """Command the pose of a frame if news concern it, at the time of the newest frame that it hangs on."""
         try:
-            chain = [frame.name for frame in self.frames.chain(name)]
+            chain = list(self.frames.chain(name))
         except CommandError:
             return  # not told yet
-        news = [told[frame] or 0.0 for frame in chain if frame in told]
-        if news:
-            latest = max(news)
-            self._submit(read, tool)
+        latest = max(frame.time or 0.0 for frame in chain) if chain else 0.0
+        if told & {frame.name for frame in chain} and not (latest and latest == self._followed.get(tool)):
+            self._followed[tool] = latest
+            self._submit(lambda: ToolPose(tool, *self.frames.in_root(name, _NO_MOVE, _NO_TURN), time=latest or None), tool)
 
 
 def _fixed_frames(parameters: Parameters, of_robot: Sequence[Frame]) -> FrameTree:

@@ -34,7 +34,8 @@ BALL = {"spheres": [[0.01, 0.0, 0.0, 0.008]], "material": "sand", "pose": {"posi
 def package(tmp_path_factory):
     """The package, importable here and in nodes."""
     folder = tmp_path_factory.mktemp("interfaces")
-    done = subprocess.run([sys.executable, interface_builder.__file__, folder], capture_output=True, text=True, check=False)
+    command = [sys.executable, interface_builder.__file__, folder, "simulation_interfaces"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder / "site")

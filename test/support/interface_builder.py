@@ -1,7 +1,7 @@
-"""Builds ``simulation_interfaces``, which is not among the wheels, from the fields and constants in the file beside this one.
+"""Builds a package of messages that is not among the wheels from the fields and constants in the file of its name.
 
-Run as a program: ``python interface_builder.py FOLDER``; the package is then in ``FOLDER/site``. Needs gcc, g++ and the headers
-of Python. What comes out talks to everyone who has the package with the same fields.
+Run as a program: ``python interface_builder.py FOLDER PACKAGE``; the package is then in ``FOLDER/site``. Needs gcc, g++ and the
+headers of Python. What comes out talks to everyone who has the package with the same fields.
 """
 
 import importlib.metadata
@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy
 
-NAME = "simulation_interfaces"
+NAME = sys.argv[2] if __name__ == "__main__" else ""
 USED = ("std_msgs", "geometry_msgs", "builtin_interfaces", "service_msgs", "action_msgs", "unique_identifier_msgs")
 KINDS = ("generator_c", "generator_py", "typesupport_c", "typesupport_fastrtps_c", "typesupport_introspection_c")
 RUNTIME = ("rosidl_runtime_c", "rosidl_typesupport_c", "rosidl_typesupport_fastrtps_c", "rosidl_typesupport_fastrtps_cpp")
