@@ -32,16 +32,23 @@ def compile_all(kernels, architectures, folder):
 
 
 @cache
-def launched(name):
+def launched(name, contact="rough"):
     """Kernels that a shipped scene launches on a device of many threads."""
+    scene = load_scene(CONFIG / f"{name}.yaml")
+    scene = replace(scene, tools=tuple(replace(tool, contact=contact) for tool in scene.tools))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sand_sim.assemble.open_device", lambda name, threads: ManyThreads())
-        solver = assemble(load_scene(CONFIG / f"{name}.yaml")).solver
+        solver = assemble(scene).solver
     return list_kernels(solver.arrays, solver.stages, solver.device)
 
 
 def test_kernels_of_the_dig_compile(tmp_path):
     compile_all(launched("dig"), (90,), tmp_path)
+
+
+@pytest.mark.slow
+def test_kernels_of_smooth_tools_compile(tmp_path):
+    compile_all(launched("dig", "smooth"), ARCHITECTURES, tmp_path)
 
 
 @pytest.mark.slow
