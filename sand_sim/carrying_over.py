@@ -7,7 +7,8 @@ import numpy as np
 from sand_sim.assemble import Assembly, build_solver
 from sand_sim.grain_table import GrainTable
 from sand_sim.integrator import VERLET
-from sand_sim.tool_model import ToolModel, model_tool
+from sand_sim.mesh_roots import allowed_mesh, mesh_roots
+from sand_sim.tool_model import ToolModel, model_tool, with_mesh
 
 _SPARE = 1.05  # of a tool's reach
 _ADDED = ("radius", "density", "material")  # columns of a table that a state cannot tell
@@ -101,7 +102,7 @@ def fit(assembly: Assembly, loaded: Assembly, models: dict, state: dict[str, np.
 
     Raises:
         ValueError: if the state is of another scene.
-        SceneError: if a mesh that it asks for can no longer be used.
+        SceneError: if a mesh that it asks for may not be read, or can no longer be used.
     """
     table, tools = assembly.table, list(assembly.tools)
     wanted = [np.asarray(state.get(f"added.{name}", np.zeros(0))) for name in _ADDED]
@@ -117,7 +118,10 @@ def fit(assembly: Assembly, loaded: Assembly, models: dict, state: dict[str, np.
     for index, (path, scale) in enumerate(zip(state.get("mesh.path", ()), state.get("mesh.scale", ()), strict=True)):
         key = (index, str(path), float(scale))
         if path and key not in models:
-            models[key] = model_tool(replace(tools[index].tool, mesh=key[1], scale=key[2]), assembly.scene, _silent)
+            scene, tool = assembly.scene, tools[index].tool
+            file = allowed_mesh(key[1], *mesh_roots(scene.mesh_roots, scene.folder))
+            model = model_tool(with_mesh(tool, str(file), key[2]), scene, _silent)
+            models[key] = replace(model, tool=with_mesh(tool, key[1], key[2]))
         tools[index] = models[key] if path else loaded.tools[index]
     reserve = float(state.get("lattice.reserve", assembly.lattice.reserve))
     same = (

@@ -1,6 +1,5 @@
 """Whether a command makes sense by itself, and where a velocity leads."""
 
-from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -9,33 +8,25 @@ from sand_sim import rotation
 from sand_sim.border import CommandError, ToolPose, ToolVelocity
 
 Command = ToolPose | ToolVelocity
-_LEAST_LENGTH = 1e-6  # of a quaternion
 
 
-def check_command(command: Command, tools: Collection[str]) -> Command:
+def check_command(command: Command) -> Command:
     """The command, its orientation brought to length one.
 
-    Args:
-        command: pose or velocity.
-        tools: known names.
-
     Raises:
-        CommandError: if the tool is unknown, pose, velocity or time are not finite, or the quaternion is zero.
+        CommandError: if pose, velocity or time are not finite, or the quaternion is zero.
     """
     tool = f"tool '{command.tool}'"
-    if command.tool not in tools:
-        raise CommandError("unknown_tool", f"{tool} is unknown; known are {', '.join(tools) or 'none'}")
     moving = isinstance(command, ToolVelocity)
     names = ("linear", "angular") if moving else ("position", "orientation")
     values = {name: np.asarray(getattr(command, name), float) for name in names}
     if not np.all(np.isfinite(np.concatenate([*values.values(), [command.time or 0.0]]))):
         raise CommandError("not_finite", f"{tool}: {names[0]}, {names[1]} and time must be finite")
     if not moving:
-        orientation = values["orientation"]
-        largest = float(np.abs(orientation).max())  # divided out first, because squares of large numbers overflow
-        if largest < _LEAST_LENGTH or largest * (length := float(np.linalg.norm(orientation / largest))) < _LEAST_LENGTH:
-            raise CommandError("zero_quaternion", f"{tool}: orientation is the zero quaternion; (0, 0, 0, 1) is no rotation")
-        values["orientation"] = orientation / largest / length
+        try:
+            values["orientation"] = rotation.unit(values["orientation"])
+        except ValueError as error:
+            raise CommandError("zero_quaternion", f"{tool}: orientation is {error}") from None
     return replace(command, **values)
 
 

@@ -1,6 +1,7 @@
 """Frames by name and how they lie in each other: a table of fixed ones, and what TF tells."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,12 +34,13 @@ class FrameTree:
             raise CommandError("bad_frame", f"frame '{name}' in '{frame.parent}': needs two different names")
         if not np.all(np.isfinite(np.concatenate([frame.position, frame.orientation]))):
             raise CommandError("not_finite", f"frame '{name}' in '{frame.parent}': position and orientation must be finite")
-        length = float(np.linalg.norm(frame.orientation))
-        if length < 1e-6:
-            raise CommandError("zero_quaternion", f"frame '{name}': orientation is the zero quaternion")
+        try:
+            orientation = rotation.unit(frame.orientation)
+        except ValueError as error:
+            raise CommandError("zero_quaternion", f"frame '{name}' in '{frame.parent}': orientation is {error}") from None
         if name not in self._frames and len(self._frames) >= _MOST:
             raise CommandError("flooded", f"frame '{name}': {_MOST} frames are known already")
-        self._frames[name] = Frame(name, frame.parent, frame.position, frame.orientation / length, frame.time)
+        self._frames[name] = replace(frame, orientation=orientation)
 
     def chain(self, name: str) -> Iterator[Frame]:
         """The frames from one up to, and without, the root.

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+_LEAST_LENGTH = 1e-6  # of a quaternion that somebody meant
+
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Rotation b, then rotation a, shape (4,)."""
@@ -14,6 +16,19 @@ def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
             aw * bw - ax * bx - ay * by - az * bz,
         ]
     )
+
+
+def unit(q: np.ndarray) -> np.ndarray:
+    """A quaternion at length one, shape (4,).
+
+    Raises:
+        ValueError: if it is the zero quaternion, or shorter than 1e-6.
+    """
+    q = np.asarray(q, float)
+    largest = float(np.abs(q).max())  # divided out first, because squares of large numbers overflow
+    if largest < _LEAST_LENGTH or largest * (length := float(np.linalg.norm(q / largest))) < _LEAST_LENGTH:
+        raise ValueError("the zero quaternion; (0, 0, 0, 1) is no rotation")
+    return q / largest / length
 
 
 def inverse(q: np.ndarray) -> np.ndarray:

@@ -25,7 +25,10 @@ def describe_scene(assembly: Assembly) -> dict:
         MeshError: the same of a mesh.
     """
     scene, lattice, solver = assembly.scene, assembly.lattice, assembly.scene.solver
-    tools = {tool.tool.name: _named(tool.tool, mesh=_mesh_digest(tool.mesh), trajectory=None) for tool in assembly.tools}
+    tools = {
+        model.tool.name: _named(model.tool, mesh=_mesh_digest(model.mesh), urdf=None, link=None, trajectory=None)
+        for model in assembly.tools
+    }
     bodies = {
         model.body.name: _named(
             model.body,

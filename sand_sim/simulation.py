@@ -53,7 +53,7 @@ class Simulation:
         fault: the error that has stopped the stepping, None while all is well.
         rejected: number of rejected commands by reason.
         last_rejection: message of the last rejected command.
-        step_time: wall time of a step, mean of the last few [s].
+        step_time: wall time of a step, mean since the last observation or command [s].
     """
 
     def __init__(

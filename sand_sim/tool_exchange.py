@@ -9,7 +9,7 @@ from sand_sim.assemble import Assembly
 from sand_sim.border import CommandError, GrainCloud
 from sand_sim.clearance import as_at_start
 from sand_sim.scene.types import SceneError, Tool
-from sand_sim.tool_model import ToolModel, model_tool
+from sand_sim.tool_model import ToolModel, model_tool, with_mesh
 
 
 def read_tool(assembly: Assembly, tool: Tool, mesh: str, scale: float) -> ToolModel:
@@ -20,7 +20,7 @@ def read_tool(assembly: Assembly, tool: Tool, mesh: str, scale: float) -> ToolMo
     """
     if not (np.isfinite(scale) and scale > 0.0):
         raise CommandError("bad_mesh", f"tool '{tool.name}': scale must be positive, not {scale}")
-    lattice, other = assembly.lattice, replace(tool, mesh=str(mesh), scale=float(scale))
+    lattice, other = assembly.lattice, with_mesh(tool, str(mesh), scale)
     widest = float(np.max(lattice.high - lattice.low))
     try:
         corners = read_mesh(locate_mesh(other.mesh, assembly.scene.folder), other.scale).vertices

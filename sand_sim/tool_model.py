@@ -1,7 +1,7 @@
 """A scene's tools made into meshes and particles."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -70,6 +70,11 @@ class ToolModel:
         local = rotation.rotate(rotation.inverse(np.asarray(pose.orientation)), position - np.asarray(pose.position))
         solid = self.mesh if self.surface is None else trimesh.Trimesh(**trimesh.triangles.to_kwargs(self.surface))
         return SignedDistance(solid).query(local)[0] - self.margin
+
+
+def with_mesh(tool: Tool, mesh: str, scale: float) -> Tool:
+    """The tool with another mesh, in place of its own or of the link of a robot that it was."""
+    return replace(tool, mesh=mesh, scale=float(scale), urdf="", link="")
 
 
 def model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:

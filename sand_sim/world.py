@@ -118,7 +118,8 @@ class World(Changeable):
         Raises:
             CommandError: if the tool is unknown, or pose, velocity or time are not finite.
         """
-        return check_command(command, self._tool_index)
+        self._index_of(command.tool)
+        return check_command(command)
 
     def pose_after(self, velocity: ToolVelocity, duration: float) -> ToolPose:
         """Where a velocity leads a tool from where it is, in a time [s].

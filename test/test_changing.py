@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import yaml
 from scenes import SceneMaker, floor, write_small_scene
 
 from sand_sim import CommandError, ToolPose, UnstableError, World, load_scene, read_scene
@@ -341,3 +342,27 @@ def test_clumps_and_bodies_come_along(tmp_path):
     world.step(50)
     world.reset()
     assert len(world.observe().grains) == 21
+
+
+def test_new_grains_leave_contacts_of_a_smooth_tool(tmp_path):
+    path = write_small_scene(tmp_path)
+    scene = yaml.safe_load(path.read_text())
+    scene["tools"]["plate"]["contact"] = "smooth"
+    path.write_text(yaml.safe_dump(scene))
+    world = World(load_scene(path))
+    for at, position in ((0.1, [0.015, 0.015, 0.0214]), (0.2, [0.025, 0.015, 0.0214])):
+        world.apply(ToolPose("plate", np.array(position), NO_TURN, at))
+        world.step(round((min(at, 0.15) - world.time) / world.time_step))
+    before, kept = world.tool_contacts("plate"), world.save()
+    world.add_grains(CLEAR, SMALL)
+    after, now = world.tool_contacts("plate"), world.save()
+    assert len(before) > 3
+    assert len(set(before.identity)) == len(before)
+    one, other = np.argsort(before.identity), np.argsort(after.identity)
+    assert np.array_equal(after.identity[other], before.identity[one])
+    assert np.array_equal(after.force[other], before.force[one])
+    for name in ("memory", "touch"):  # in whatever order
+        assert np.any(kept[f"tool.{name}"])
+        assert {row.tobytes() for row in now[f"tool.{name}"]} == {row.tobytes() for row in kept[f"tool.{name}"]}
+    world.step(200)
+    assert world.tool_contacts("plate").wrench[0] == pytest.approx(before.wrench[0], rel=0.5)

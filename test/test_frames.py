@@ -68,3 +68,10 @@ def test_a_flood_of_frames_is_stopped():
         for k in range(20_000):
             tree.put(Frame(f"f{k}", "world", np.zeros(3), NO_TURN))
     tree.put(Frame("f1", "f2", np.zeros(3), NO_TURN))
+
+
+def test_length_of_a_quaternion_does_not_matter():
+    tree, turned = FrameTree("world"), rotation.from_rpy(0.0, 0.0, 0.5 * np.pi)
+    for size in (1e-3, 1.0, 1e200):
+        tree.put(Frame("a", "world", np.zeros(3), size * turned))
+        assert tree.in_root("a", np.array([1.0, 0.0, 0.0]), NO_TURN)[0] == pytest.approx([0.0, 1.0, 0.0])

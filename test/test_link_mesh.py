@@ -151,3 +151,17 @@ def test_real_meshes_under_two_joints(tmp_path):
     mesh = make_link_mesh(described, "hand", lambda uri: MESHES / uri)
     assert mesh.bounds == pytest.approx(hand.bounds + [0.0, 0.0, 0.1])
     assert len(mesh.faces) == len(hand.faces) != len(base.faces), "what is only seen does not collide"
+
+
+def test_another_mesh_takes_the_place_of_a_link(tmp_path):
+    """Also in a state that is put back into a world that has never had it."""
+    trimesh.creation.box((0.03, 0.03, 0.004)).export(tmp_path / "small_plate.stl")
+    path = write_scene(tmp_path, ROBOT, TOOL)
+    world = World(load_scene(path))
+    world.set_tool_mesh("plate", "small_plate.stl")
+    other = World(load_scene(path))
+    other.restore(world.save())
+    for one in (world, other):
+        assert one.tools[0].mesh.extents == pytest.approx([0.03, 0.03, 0.004])
+    other.reset()
+    assert other.tools[0].mesh.extents == pytest.approx([0.06, 0.06, 0.004])

@@ -6,7 +6,7 @@ import trimesh
 from scenes import write_small_scene
 from test_changing import NO_TURN, drawn, memories, same_state
 
-from sand_sim import CommandError, ToolPose, World, load_scene
+from sand_sim import CommandError, SceneError, ToolPose, World, load_scene
 
 
 def box(tmp_path, name, edges, up=0.0):
@@ -179,3 +179,23 @@ def test_states_know_their_tools(tmp_path):
         one.reset()
         assert one.tools[0].tool.mesh == "plate.stl"
         assert same_state(one.save(), loaded)
+
+
+def test_a_state_names_no_mesh_outside_the_roots(tmp_path):
+    """A file of a state may come from a stranger."""
+    (tmp_path / "here").mkdir()
+    (tmp_path / "outside").mkdir()
+    path = write_small_scene(tmp_path / "here")
+    secret = tmp_path / "outside" / "secret.stl"
+    trimesh.creation.box((0.03, 0.03, 0.004)).export(secret)
+    world = World(load_scene(path))
+    world.set_tool_mesh("plate", str(secret))
+    state, other = world.save(), World(load_scene(path))
+    before = other.save()
+    for put in (other.check_state, other.restore):
+        with pytest.raises(SceneError, match="lies outside the folders"):
+            put(state)
+    assert same_state(other.save(), before)
+    world.reset()
+    world.restore(state)
+    assert world.tools[0].mesh.extents == pytest.approx([0.03, 0.03, 0.004]), "its own"

@@ -58,7 +58,7 @@ class SandSimNode(LifecycleNode):
 
     def __init__(self, progress=lambda stage, share: None, **node_arguments):
         super().__init__("sand_sim", **node_arguments)
-        self.configured = self.done = self._active = self._held = False
+        self.configured = self.done = self._active = self._held = self._starting = False
         self.failure: Exception | None = None
         self._progress, self._endings = progress, ExitStack()
         try:
@@ -75,9 +75,11 @@ class SandSimNode(LifecycleNode):
             ValueError: if a parameter has no sensible value.
             Exception: whatever ``progress`` raises.
         """
+        self._starting = True
         for trigger in (self.trigger_configure, self.trigger_activate):
             if trigger() != _DONE:
                 raise self.failure
+        self._starting = False
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Load the scene, compile, settle, connect."""
@@ -86,7 +88,7 @@ class SandSimNode(LifecycleNode):
             self._configure()
         except Exception as error:
             self.failure = error
-            if not self.parameters["autostart"]:
+            if not self._starting:  # else it is raised
                 self.get_logger().error(f"cannot be configured: {error}")
             self._tear_down()
             return _REFUSED

@@ -8,6 +8,7 @@ import trimesh
 from sand_sim.border import Observation
 from sand_sim.sinks.colours import colour_by_speed
 from sand_sim.sinks.wall_mesh import shell_mesh
+from sand_sim.tool_model import ToolModel
 from sand_sim.world import World
 
 _TIMELINE = "sim_time"
@@ -18,7 +19,7 @@ class Drawing:
     """Draws observations on a stream of Rerun.
 
     Args:
-        world: whose walls and tools are drawn, at once.
+        world: that is drawn, its walls at once.
         stream: to draw on.
         particles: also draw the particles of the tools.
     """
@@ -27,9 +28,10 @@ class Drawing:
         self._fastest = max((tool.max_speed for tool in world.scene.tools), default=1.0)
         self._identity = np.zeros(0, int)
         self._plungers = {wall.name for wall in world.assembly.walls if wall.drive}
-        self._recording = stream
+        self._recording, self._world, self._particles = stream, world, particles
+        self._drawn: dict[str, ToolModel] = {}
         stream.send_blueprint(_blueprint(world), make_active=False, make_default=True)
-        self._draw_still(world, particles)
+        self._draw_still(world)
 
     def write(self, observation: Observation) -> None:
         """Add one observation."""
@@ -48,6 +50,10 @@ class Drawing:
             if wall.name in self._plungers:
                 recording.log(f"world/walls/{wall.name}", rr.Transform3D(translation=wall.position))
                 recording.log(f"force/{wall.name}", rr.Scalars(float(np.linalg.norm(wall.force))))
+        for model in self._world.tools:
+            if self._drawn.get(model.tool.name) is not model:
+                self._drawn[model.tool.name] = model
+                self._draw_tool(model)
         for tool in observation.tools:
             pose = rr.Transform3D(translation=tool.position, quaternion=rr.Quaternion(xyzw=tool.orientation))
             recording.log(f"world/tools/{tool.name}", pose)
@@ -66,8 +72,8 @@ class Drawing:
         for name, value in shown.items():
             recording.log(f"health/{name}", rr.Scalars(value))
 
-    def _draw_still(self, world: World, particles: bool) -> None:
-        """Draw what never changes: axes, walls, tool meshes and particles."""
+    def _draw_still(self, world: World) -> None:
+        """Draw what never changes: axes and walls."""
         recording = self._recording
         recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         for boundary in world.scene.boundaries:
@@ -84,13 +90,14 @@ class Drawing:
         for ground in world.assembly.grounds:
             mesh = _flat_mesh(ground.mesh, ground.place, [150, 135, 110, 255])
             recording.log(f"world/walls/{ground.name}", mesh, static=True)
-        for model in world.tools:
-            name = f"world/tools/{model.tool.name}"
-            mesh = _flat_mesh(model.mesh, np.zeros(3), [140, 150, 165, 255])
-            recording.log(f"{name}/mesh", mesh, static=True)
-            if particles:
-                points = rr.Points3D(model.body.points.astype(np.float32), radii=model.body.radius, colors=[[90, 120, 190]])
-                recording.log(f"{name}/particles", points, static=True)
+
+    def _draw_tool(self, model: ToolModel) -> None:
+        """Draw the mesh and the particles that a tool has from now on."""
+        name = f"world/tools/{model.tool.name}"
+        self._recording.log(f"{name}/mesh", _flat_mesh(model.mesh, np.zeros(3), [140, 150, 165, 255]))
+        if self._particles:
+            points = rr.Points3D(model.body.points.astype(np.float32), radii=model.body.radius, colors=[[90, 120, 190]])
+            self._recording.log(f"{name}/particles", points)
 
 
 def _flat_mesh(mesh: trimesh.Trimesh, place: np.ndarray, colour: list[int]) -> rr.Mesh3D:

@@ -8,12 +8,29 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="needs ROS 2")
 
+import interface_builder
 from node_client import Client
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from scenes import write_small_scene
 
 from sand_sim.node.node import SandSimNode
+
+
+@pytest.fixture(scope="module")
+def build_messages(tmp_path_factory):
+    """``build_messages(package)`` generates a package that is not among the wheels, to be imported here and in nodes."""
+    with pytest.MonkeyPatch.context() as patch:
+
+        def build(package):
+            folder = tmp_path_factory.mktemp("interfaces")
+            command = [sys.executable, interface_builder.__file__, folder, package]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, done.stderr
+            patch.syspath_prepend(folder / "site")
+            patch.setenv("PYTHONPATH", str(folder / "site"))
+
+        yield build
 
 
 @pytest.fixture

@@ -2,8 +2,6 @@
 
 import shutil
 import signal
-import subprocess
-import sys
 import time
 from types import SimpleNamespace
 
@@ -12,7 +10,6 @@ import pytest
 
 rclpy = pytest.importorskip("rclpy", reason="needs ROS 2")
 
-import interface_builder
 from action_msgs.msg import GoalStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
@@ -31,18 +28,12 @@ BALL = {"spheres": [[0.01, 0.0, 0.0, 0.008]], "material": "sand", "pose": {"posi
 
 
 @pytest.fixture(scope="module")
-def package(tmp_path_factory):
+def package(build_messages):
     """The package, importable here and in nodes."""
-    folder = tmp_path_factory.mktemp("interfaces")
-    command = [sys.executable, interface_builder.__file__, folder, "simulation_interfaces"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(folder / "site")
-        patch.setenv("PYTHONPATH", str(folder / "site"))
-        from simulation_interfaces import action, msg, srv
+    build_messages("simulation_interfaces")
+    from simulation_interfaces import action, msg, srv
 
-        yield SimpleNamespace(action=action, msg=msg, srv=srv)
+    return SimpleNamespace(action=action, msg=msg, srv=srv)
 
 
 @pytest.fixture

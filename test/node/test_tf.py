@@ -1,15 +1,12 @@
 """Tools that follow TF, and tools whose frames are told to it, with messages generated from their one field."""
 
 import shutil
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
-import interface_builder
 from geometry_msgs.msg import PoseStamped
 from node_client import NO_TURN, START
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -26,18 +23,12 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def tf_message(tmp_path_factory):
+def tf_message(build_messages):
     """The message type, importable here and in nodes."""
-    folder = tmp_path_factory.mktemp("interfaces")
-    command = [sys.executable, interface_builder.__file__, folder, "tf2_msgs"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(folder / "site")
-        patch.setenv("PYTHONPATH", str(folder / "site"))
-        from tf2_msgs.msg import TFMessage
+    build_messages("tf2_msgs")
+    from tf2_msgs.msg import TFMessage
 
-        yield TFMessage
+    return TFMessage
 
 
 def test_a_tool_follows_its_frame(client, start_process, tf_message, tmp_path):
