@@ -36,7 +36,7 @@ def main() -> None:
     if options.write:
         write(options.points, options.rate, options.seconds, options.write)
         return
-    os.environ |= {"ROS_DOMAIN_ID": str(100 + os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    os.environ |= {"ROS_DOMAIN_ID": str(1 + os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     for profile in (True, False):
         for reliability in ("reliable", "best_effort"):
             row = {"benchmark": "cloud_transport", "points": options.points, "rate": options.rate, "seconds": options.seconds}

@@ -46,7 +46,7 @@ def time_node(setup: Setup, tiles: tuple[int, int] = TILES, pings: int = PINGS) 
     from rclpy.signals import SignalHandlerOptions
 
     # A domain of our own, heard on this machine only, whatever else runs on the network.
-    os.environ |= {"ROS_DOMAIN_ID": str(100 + os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    os.environ |= {"ROS_DOMAIN_ID": str(1 + os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         for threads in setup.threads:

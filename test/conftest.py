@@ -8,8 +8,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent / "support"))
 
-# A domain of our own, heard on this machine only, whatever else runs on the network. Set before any rclpy import.
-os.environ["ROS_DOMAIN_ID"] = str(100 + os.getpid() % 100)
+# A domain of our own, heard on this machine only, whatever else runs on the network; above 101 its ports are those that
+# Linux gives to anyone. Set before any rclpy import.
+os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from scenes import SceneMaker

@@ -132,6 +132,7 @@ class SandSimNode(LifecycleNode):
         """Finish all files, then go."""
         self._tear_down()
         super().destroy_node()
+        self._state_machine = None  # it keeps the node in the graph, and cycles keep it
 
     @property
     def refusal(self) -> str:

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import threading
+from contextlib import ExitStack
 
 import pytest
 
@@ -50,12 +51,12 @@ def client(ros):
 @pytest.fixture
 def start_node(ros, tmp_path):
     """``start_node(pacing=..., ...)`` runs a node on the small scene in a thread of this process."""
-    running = []
 
     def start(scene_fields=None, **parameters):
         scene = write_small_scene(tmp_path, **(scene_fields or {}))
         overrides = [Parameter(name, value=value) for name, value in ({"scene": str(scene)} | parameters).items()]
         node = SandSimNode(parameter_overrides=overrides)
+        running.callback(node.destroy_node)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         if node.parameters["autostart"]:
@@ -68,14 +69,12 @@ def start_node(ros, tmp_path):
 
         thread = threading.Thread(target=spin)
         thread.start()
-        running.append((node, ending, thread))
+        running.callback(thread.join)
+        running.callback(ending.set)
         return node
 
-    yield start
-    for node, ending, thread in running:
-        ending.set()
-        thread.join()
-        node.destroy_node()
+    with ExitStack() as running:
+        yield start
 
 
 @pytest.fixture

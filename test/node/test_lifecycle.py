@@ -1,5 +1,7 @@
 """Lifecycle: configure, activate, deactivate, clean up, and whatever a client asks in the wrong moment."""
 
+import gc
+
 import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
@@ -12,6 +14,8 @@ from node_client import START
 from rclpy.parameter import Parameter
 from scenes import write_small_scene
 from std_srvs.srv import Trigger
+
+from sand_sim.node.node import SandSimNode
 
 
 def change(client, label):
@@ -98,3 +102,16 @@ def test_pausing_and_activity_both_hold(client, start_node):
     assert not client.call(Trigger, "resume").success
     assert change(client, "activate")
     assert node.simulation.paused, "as it was before"
+
+
+def test_a_destroyed_node_leaves_the_graph(client, tmp_path):
+    """At once, not when garbage is collected: whoever asks by its name would be told of the one that is gone."""
+    node = SandSimNode(parameter_overrides=[Parameter("scene", value=str(write_small_scene(tmp_path)))])
+    gc.disable()
+    try:
+        node.start()
+        client.wait_for(lambda: "sand_sim" in client.node.get_node_names())
+        node.destroy_node()
+        client.wait_for(lambda: "sand_sim" not in client.node.get_node_names(), patience=5.0)
+    finally:
+        gc.enable()
