@@ -10,7 +10,7 @@ from scenes import floor, write_small_scene
 
 from sand_sim.assemble import assemble
 from sand_sim.cli.main import main
-from sand_sim.engine.pair_forces import build_pair_forces
+from sand_sim.engine.pair_tiles import build_pair_tiles
 from sand_sim.plan import make_plan
 from sand_sim.scene.reading import read_scene
 from sand_sim.scene.shapes import TETRAHEDRON
@@ -47,12 +47,12 @@ def test_each_feature_brings_its_own_arrays_and_nothing_else(plan_of):
 
 
 def test_frictionless_kernels_contain_no_code_of_what_was_left_out(make_world):
-    """The source that Warp generates for the pair forces has no line for rotation and friction."""
+    """The source that Warp generates for the pair forces has fewer lines without rotation and friction."""
 
     def lines(**further):
         world = make_world([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]], 0.005, **further)
         world.step(1)
-        return source(build_pair_forces(world.assembly.recipe)).count("\n")
+        return source(build_pair_tiles(world.assembly.recipe)).count("\n")
 
     assert lines(contact={"tangential": "none"}) < 0.7 * lines()
 

@@ -226,6 +226,7 @@ COHESION_LAWS = {
         prepare=prepare_jkr,
         asks=("adhesion",),
         memory=(1,),
+        wide=False,
         reach=jkr_reach,
     ),
 }

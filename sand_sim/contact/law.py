@@ -63,6 +63,7 @@ class Law:
         memory: sign by which each remembered number changes when the bodies of a contact swap roles; its length is how many.
         rotation: whether it can turn a sphere.
         build_energy: ``build_energy(precision, types)`` gives the Warp function for the energy stored in the law's springs.
+        wide: whether a compiler can do many contacts at once: branches choose between numbers, not vectors; no library is called.
     """
 
     build: Callable
@@ -72,6 +73,7 @@ class Law:
     asks: tuple[str, ...] = ()
     memory: tuple[int, ...] = ()
     rotation: bool = False
+    wide: bool = True
 
 
 NONE = Law(build=lambda precision, types: None)

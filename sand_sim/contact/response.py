@@ -89,66 +89,6 @@ def build_fresh(precision: Precision) -> wp.Function:
 
 
 @cache
-def build_memory_slot(model: ContactModel, precision: Precision, slot: str) -> tuple[wp.Function, wp.Function]:
-    """Warp functions that take the memory of one slot out of a contact's memory, and put it back."""
-    real, vec3, vec4 = precision.real, precision.vec3, precision.vec4
-    memory, first, length = memory_type(model, precision), model.offset(slot), len(model.laws[slot].memory)
-
-    if length in (3, 4) and length == len(model.memory):
-
-        @wp.func
-        def take(whole: memory):
-            return whole
-
-        @wp.func
-        def put(whole: memory, part: memory):
-            return part
-
-    elif length == 4:
-
-        @wp.func
-        def take(whole: memory):
-            return vec4(
-                whole[wp.static(first)], whole[wp.static(first + 1)], whole[wp.static(first + 2)], whole[wp.static(first + 3)]
-            )
-
-        @wp.func
-        def put(whole: memory, part: vec4):
-            for k in range(4):
-                whole[wp.static(first) + k] = part[k]
-            return whole
-
-    elif length == 1:
-
-        @wp.func
-        def take(whole: memory):
-            return whole[wp.static(first)]
-
-        @wp.func
-        def put(whole: memory, part: real):
-            whole[wp.static(first)] = part
-            return whole
-
-    else:
-
-        @wp.func
-        def take(whole: memory):
-            part = vec3(real(0.0))
-            if wp.static(length == 3):
-                part = vec3(whole[wp.static(first)], whole[wp.static(first + 1)], whole[wp.static(first + 2)])
-            return part
-
-        @wp.func
-        def put(whole: memory, part: vec3):
-            if wp.static(length == 3):
-                for k in range(3):
-                    whole[wp.static(first) + k] = part[k]
-            return whole
-
-    return take, put
-
-
-@cache
 def build_response(model: ContactModel, precision: Precision) -> wp.Function:
     """Warp function ``(contact, pair, memory, dt) -> (push, drag, moment, memory)`` on body a.
 
@@ -160,37 +100,48 @@ def build_response(model: ContactModel, precision: Precision) -> wp.Function:
     normal, tangential, rolling, twisting, cohesion = built.values()
     has_tangential, has_rolling, has_twisting = (law is not None for law in (tangential, rolling, twisting))
     cohesive, memory_vector = model.cohesive, memory_type(model, precision)
-    take_slip, put_slip = build_memory_slot(model, precision, "tangential")
-    take_roll, put_roll = build_memory_slot(model, precision, "rolling")
-    take_twist, put_twist = build_memory_slot(model, precision, "twisting")
-    take_bond, put_bond = build_memory_slot(model, precision, "cohesion")
-    fresh = build_fresh(precision)
+    slips, rolls = len(model.law("tangential").memory), len(model.law("rolling").memory)
+    first_roll, its_twist, its_bond = (model.offset(slot) for slot in ("rolling", "twisting", "cohesion"))
+    remembered, fresh = len(model.memory), build_fresh(precision)
+    slip_vector = precision.vec4 if slips == 4 else vec3
 
     @wp.func
     def response(contact: types.contact, pair: types.pair, memory: memory_vector, dt: real):
-        push = real(0.0)
         drag = vec3(real(0.0))
         moment = vec3(real(0.0))
         after = memory_vector()
-        # Where nothing acts across a gap only touching contacts come here.
-        if not wp.static(cohesive) or contact.overlap > real(0.0):
-            contact = fresh(contact, dt)
-            push = normal(contact, pair)
-            if wp.static(has_tangential):
-                drag, slipped = tangential(contact, pair, push, take_slip(memory))
-                after = put_slip(after, slipped)
-            if wp.static(has_rolling):
-                turn, rolled = rolling(contact, pair, push, take_roll(memory))
-                moment += turn
-                after = put_roll(after, rolled)
-            if wp.static(has_twisting):
-                twist, twisted = twisting(contact, pair, push, take_twist(memory))
-                moment += twist
-                after = put_twist(after, twisted)
+        contact = fresh(contact, dt)
+        push = normal(contact, pair)
+        if wp.static(has_tangential):
+            slip = slip_vector()
+            for k in range(wp.static(slips)):
+                slip[k] = memory[k]
+            drag, slipped = tangential(contact, pair, push, slip)
+            for k in range(wp.static(slips)):
+                after[k] = slipped[k]
+        if wp.static(has_rolling):
+            roll = vec3()
+            for k in range(wp.static(rolls)):
+                roll[k] = memory[wp.static(first_roll) + k]
+            turn, rolled = rolling(contact, pair, push, roll)
+            moment += turn
+            for k in range(wp.static(rolls)):
+                after[wp.static(first_roll) + k] = rolled[k]
+        if wp.static(has_twisting):
+            twist, twisted = twisting(contact, pair, push, memory[wp.static(its_twist)])
+            moment += twist
+            after[wp.static(its_twist)] = twisted
         if wp.static(cohesive):
-            attraction, bond = cohesion(contact, pair, take_bond(memory))
-            push -= attraction
-            after = put_bond(after, bond)
+            # Across a gap all that is thrown away; where nothing acts across gaps only touching contacts count.
+            touching = contact.overlap > real(0.0)
+            attraction, bond = cohesion(contact, pair, memory[wp.static(its_bond)])
+            push = wp.where(touching, push, real(0.0)) - attraction
+            for k in range(3):
+                drag[k] = wp.where(touching, drag[k], real(0.0))
+                moment[k] = wp.where(touching, moment[k], real(0.0))
+            for k in range(wp.static(remembered)):
+                after[k] = wp.where(touching, after[k], real(0.0))
+            after[wp.static(its_bond)] = bond
         return push, drag, moment, after
 
     return response
@@ -199,14 +150,13 @@ def build_response(model: ContactModel, precision: Precision) -> wp.Function:
 @cache
 def build_stored_energy(model: ContactModel, precision: Precision) -> wp.Function:
     """Warp function ``(contact, pair, memory) -> energy [J]`` stored in all springs of a contact."""
-    real, types = precision.real, model.types(precision)
+    real, vec3, types = precision.real, precision.vec3, model.types(precision)
     built = {slot: law.build_energy and law.build_energy(precision, types) for slot, law in model.laws.items()}
     normal, tangential, rolling, twisting, cohesion = built.values()
     has = {slot: energy is not None for slot, energy in built.items()}
-    take_slip, _ = build_memory_slot(model, precision, "tangential")
-    take_roll, _ = build_memory_slot(model, precision, "rolling")
-    take_twist, _ = build_memory_slot(model, precision, "twisting")
-    take_bond, _ = build_memory_slot(model, precision, "cohesion")
+    slips, rolls = len(model.law("tangential").memory), len(model.law("rolling").memory)
+    first_roll, its_twist, its_bond = (model.offset(slot) for slot in ("rolling", "twisting", "cohesion"))
+    slip_vector = precision.vec4 if slips == 4 else vec3
 
     @wp.func
     def stored_energy(contact: types.contact, pair: types.pair, memory: memory_type(model, precision)) -> real:
@@ -214,13 +164,19 @@ def build_stored_energy(model: ContactModel, precision: Precision) -> wp.Functio
         if contact.overlap > real(0.0):
             energy += normal(contact, pair)
             if wp.static(has["tangential"]):
-                energy += tangential(contact, pair, take_slip(memory))
+                slip = slip_vector()
+                for k in range(wp.static(slips)):
+                    slip[k] = memory[k]
+                energy += tangential(contact, pair, slip)
             if wp.static(has["rolling"]):
-                energy += rolling(contact, pair, take_roll(memory))
+                roll = vec3()
+                for k in range(wp.static(rolls)):
+                    roll[k] = memory[wp.static(first_roll) + k]
+                energy += rolling(contact, pair, roll)
             if wp.static(has["twisting"]):
-                energy += twisting(contact, pair, take_twist(memory))
+                energy += twisting(contact, pair, memory[wp.static(its_twist)])
         if wp.static(has["cohesion"]):
-            energy += cohesion(contact, pair, take_bond(memory))
+            energy += cohesion(contact, pair, memory[wp.static(its_bond)])
         return energy
 
     return stored_energy

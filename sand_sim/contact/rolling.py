@@ -30,10 +30,10 @@ def build_constant(precision: Precision, types: ContactTypes) -> wp.Function:
     def constant(contact: types.contact, pair: types.pair, normal_force: real, memory: vec3):
         rolling = contact.turning - contact.normal * wp.dot(contact.turning, contact.normal)
         rate = wp.length(rolling)
-        moment = vec3(real(0.0))
+        torque = real(0.0)
         if rate > real(0.0):
-            moment = rolling * (-pair.rolling_friction * contact.radius * normal_force / rate)
-        return moment, memory
+            torque = -pair.rolling_friction * contact.radius * normal_force / rate
+        return rolling * torque, memory
 
     return constant
 

@@ -30,13 +30,16 @@ def build_bounded(precision: Precision) -> wp.Function:
     @wp.func
     def bounded(spring: vec3, viscous: vec3, stiffness: real, bound: real):
         square = stiffness * stiffness * wp.dot(spring, spring)
+        share = real(1.0)
         if square > bound * bound:
-            spring = spring * (bound / wp.sqrt(square))
-        force = -spring * stiffness - viscous
+            share = bound / wp.sqrt(square)
+        held = spring * share
+        force = -held * stiffness - viscous
         square = wp.dot(force, force)
+        share = real(1.0)
         if square > bound * bound:
-            force = force * (bound / wp.sqrt(square))
-        return force, spring
+            share = bound / wp.sqrt(square)
+        return force * share, held
 
     return bounded
 
@@ -50,11 +53,12 @@ def build_turned(precision: Precision) -> wp.Function:
         out = wp.dot(spring, normal)
         flat = spring - normal * out
         length = wp.dot(flat, flat)
+        stretch = real(1.0)
         if length > real(0.0):
             lost = out * out / length
             if lost > real(wp.static(_TURN_SQUARE)):
-                flat = flat * wp.sqrt((real(1.0) + lost) / (real(1.0) + real(wp.static(_TURN_SQUARE))))
-        return flat
+                stretch = wp.sqrt((real(1.0) + lost) / (real(1.0) + real(wp.static(_TURN_SQUARE))))
+        return flat * stretch
 
     return turned
 
@@ -73,9 +77,10 @@ def build_viscous(precision: Precision, types: ContactTypes) -> wp.Function:
         force = contact.slip * -pair.shear_viscosity
         square = wp.dot(force, force)
         bound = pair.friction * normal_force
+        share = real(1.0)
         if square > bound * bound:
-            force = force * (bound / wp.sqrt(square))
-        return force, spring
+            share = bound / wp.sqrt(square)
+        return force * share, spring
 
     return viscous
 
@@ -165,9 +170,10 @@ def build_mindlin_rescaled(precision: Precision, types: ContactTypes) -> wp.Func
 
     @wp.func
     def mindlin_rescaled(contact: types.contact, pair: types.pair, normal_force: real, memory: vec4):
-        spring = vec3(memory[0], memory[1], memory[2])
+        share = real(1.0)
         if contact.patch < memory[3]:
-            spring = spring * (contact.patch / memory[3])
+            share = contact.patch / memory[3]
+        spring = vec3(memory[0], memory[1], memory[2]) * share
         force, stretched = mindlin(contact, pair, normal_force, spring)
         return force, vec4(stretched[0], stretched[1], stretched[2], contact.patch)
 

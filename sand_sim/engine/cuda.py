@@ -28,7 +28,7 @@ class CudaRecorder:
     wide = True
 
     def __init__(self, device: "CudaDevice"):
-        self._device = device
+        self._device, self.vectors = device, device.vectors
 
     def each(self, launched: wp.Kernel, over: Count, inputs: list, wait: bool = True) -> None:
         """Launch over all items of a population: thread k takes items k, k + stride and so on."""
@@ -70,6 +70,7 @@ class CudaDevice:
         shares: threads of a launch by ``share``.
         threads: most threads of a launch by ``each``.
         wide: many threads work on one population at once.
+        vectors: no thread does many contacts at once.
 
     Args:
         name: ``cuda``, or ``cuda:1`` and so on.
@@ -80,7 +81,7 @@ class CudaDevice:
 
     lanes = 1
     shares = _SHARES
-    wide = True
+    wide, vectors = True, False
 
     def __init__(self, name: str = "cuda"):
         present = [device.alias for device in wp.get_cuda_devices()]

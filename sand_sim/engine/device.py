@@ -1,8 +1,8 @@
 """Which device a scene runs on.
 
 A device has a ``name`` for Warp and a ``label`` for people; ``lanes`` into which populations are cut (``count.Count``);
-``shares`` among which launches by ``share`` are cut; it is ``wide`` if many threads work on one lane. It loads kernels and
-records programs.
+``shares`` among which launches by ``share`` are cut; it is ``wide`` if many threads work on one lane, and has ``vectors`` if a
+thread does many contacts at once. It loads kernels and records programs.
 """
 
 import re

@@ -65,9 +65,10 @@ class LaneRecorder:
     Attributes:
         lanes: how many there are.
         wide: whether many threads work on one lane; here each has its own.
+        vectors: whether a thread does many contacts at once, in vector registers.
     """
 
-    wide = False
+    wide, vectors = False, True
 
     def __init__(self, device: "CpuDevice", lane: int):
         self._device, self._lane = device, lane
@@ -125,7 +126,7 @@ class CpuDevice:
     """All cores of this machine as one device."""
 
     name = "cpu"
-    wide = False
+    wide, vectors = False, True
 
     def __init__(self, threads: int | None = None):
         self.lanes = self.shares = threads or available_cores()

@@ -6,7 +6,17 @@ from functools import partial
 
 import warp as wp
 
-from sand_sim.engine import body_motion, finish, motion, neighbours, pair_forces, plungers, surface_contacts, tool_contacts
+from sand_sim.engine import (
+    body_motion,
+    finish,
+    motion,
+    neighbours,
+    pair_forces,
+    pair_tiles,
+    plungers,
+    surface_contacts,
+    tool_contacts,
+)
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_lay_cells
 from sand_sim.engine.contact_list import ContactList, record_count, record_fill
@@ -179,8 +189,12 @@ def pair_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
     """Forces between grains."""
     contacts = arrays.pair_list
     inputs = [*_grain_arguments(arrays, contacts), *_act_arguments(arrays, "pair")]
-    last = not (arrays.walls or arrays.tools)
-    recorder.each(pair_forces.build_pair_forces(arrays.recipe, measuring), contacts.pairs, inputs, wait=last)
+    recipe, last = arrays.recipe, not (arrays.walls or arrays.tools)
+    if recorder.vectors and recipe.contact.wide and not measuring:
+        kernel = pair_tiles.build_pair_tiles(recipe)
+    else:
+        kernel = pair_forces.build_pair_forces(recipe, measuring)
+    recorder.each(kernel, contacts.pairs, inputs, wait=last)
 
 
 def wall_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:

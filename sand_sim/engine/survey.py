@@ -19,7 +19,8 @@ class Survey:
     """
 
     def __init__(self, device):
-        self.lanes, self.wide, self.kernels, self._device = device.lanes, device.wide, {}, device.name
+        self.lanes, self.wide, self.vectors, self._device = device.lanes, device.wide, device.vectors, device.name
+        self.kernels = {}
 
     def each(self, launched: wp.Kernel, over: Count, inputs: list, wait: bool = True) -> None:
         """Note a launch over all items of a population."""

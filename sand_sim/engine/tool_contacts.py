@@ -14,7 +14,7 @@ from sand_sim.engine.act import build_act, build_acts
 from sand_sim.engine.contact_list import build_note
 from sand_sim.engine.count import count_of
 from sand_sim.engine.kernel import kernel
-from sand_sim.engine.pair_forces import build_direction
+from sand_sim.engine.pair_contact import build_direction
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.smooth_tools import SLOTS
 from sand_sim.engine.tools import tool_types

@@ -12,7 +12,12 @@ class ManyThreads(CudaDevice):
         threads: most threads of a launch; few, so that each takes several items.
         shares: of what is walked through in order.
         eager: launch at once instead of recording; conditions are then read by Python.
+
+    Attributes:
+        vectors: as on a CPU, because compilers may round otherwise where they do many contacts at once.
     """
+
+    vectors = True
 
     def __init__(self, threads=100, shares=37, eager=False):
         self.name = self.label = "cpu"
