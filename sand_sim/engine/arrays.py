@@ -15,6 +15,7 @@ from sand_sim.engine.count import Count
 from sand_sim.engine.flags import Flags
 from sand_sim.engine.grains import Grains
 from sand_sim.engine.lattice import Lattice
+from sand_sim.engine.neighbours import HITS
 from sand_sim.engine.plungers import SUM_BLOCK, Plungers
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.skin import Skin
@@ -116,7 +117,7 @@ class DemArrays:
         self.met = SortedItems.allocate(number, 0, on)
 
         few = max(int(_FIRST_OTHERS * number), 64)
-        self.pair_list = self._contact_list(_FIRST_PAIRS * number)
+        self.pair_list = self._contact_list(_FIRST_PAIRS * number + 64)
         self.walls = wp.array(walls, dtype=Surface, device=device) if walls else None
         self.wall_list = self._contact_list(few) if walls else None
         self.plungers = Plungers(list(drives), device) if drives else None
@@ -157,6 +158,7 @@ class DemArrays:
         self.met = replace(self.met, cursor=met_cursor)
         for contacts in self.lists.values():
             contacts.counts, contacts.old_starts, contacts.new_starts = counts, old_starts, filling.lend(int, number + 1)
+        self.hits = filling.lend(int, HITS * number)
         self.energy_blocks = {
             name: wp.zeros(energy.blocks_for(c.pairs.capacity), dtype=wp.vec2d, device=self.device)
             for name, c in self.lists.items()

@@ -12,6 +12,8 @@ from sand_sim.engine.count import count_of, share_out
 from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.recipe import Recipe
 
+HITS = 6  # a sphere's partners that the counting search notes for the filling one, and one that is none; few have more
+
 
 @wp.func
 def of_one_body(member: wp.array(dtype=int), body_of: wp.array(dtype=int), i: int, j: int) -> bool:
@@ -26,15 +28,53 @@ def of_one_body(member: wp.array(dtype=int), body_of: wp.array(dtype=int), i: in
 
 
 @cache
+def build_list_pair(recipe: Recipe) -> wp.Function:
+    """Warp function that writes a pair into the list, with what the last list remembers of it."""
+    memory_vector, swapped = memory_type(recipe.contact, recipe.precision), build_swapped(recipe)
+    history = recipe.history
+
+    @wp.func
+    def list_pair(
+        at: int,
+        i: int,
+        j: int,
+        owner: wp.array(dtype=int),
+        partner: wp.array(dtype=int),
+        memory: wp.array(dtype=memory_vector),
+        came_from: wp.array(dtype=int),
+        old_starts: wp.array(dtype=int),
+        old_partner: wp.array(dtype=int),
+        old_memory: wp.array(dtype=memory_vector),
+    ):
+        owner[at] = i
+        partner[at] = j
+        if wp.static(history):
+            kept = memory_vector()
+            came = sure(came_from[i])
+            was = sure(came_from[j])
+            old = listed_at(old_starts, old_partner, came, was)
+            if old >= 0:
+                kept = old_memory[sure(old)]
+            else:
+                old = listed_at(old_starts, old_partner, was, came)
+                if old >= 0:
+                    kept = swapped(old_memory[sure(old)])
+            memory[at] = kept
+
+    return list_pair
+
+
+@cache
 def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
     """Kernel that visits each pair of spheres closer than touch plus skin, once, from the sphere that comes first.
 
     Spheres are numbered in the order of their cells, level by level from fine to coarse. A sphere looks at what follows in its
-    own level and at all cells around it in coarser levels. The first pass counts, the second (``filling``) writes the list.
+    own level and at all cells around it in coarser levels. The first pass counts and notes what it finds; the second, the
+    ``filling``, writes the list and searches again only for spheres of which not all was noted.
     """
-    precision, history, bodies = recipe.precision, recipe.history, recipe.bodies
+    precision, bodies = recipe.precision, recipe.bodies
     real, whole, whole3, whole4 = precision.real, precision.whole, precision.whole3, precision.whole4
-    memory_vector, swapped = memory_type(recipe.contact, precision), build_swapped(recipe)
+    memory_vector, list_pair = memory_type(recipe.contact, precision), build_list_pair(recipe)
     level = level_type(precision)
     level_of, cell_of = cell_functions(precision)
 
@@ -51,6 +91,7 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         across: real,
         member: wp.array(dtype=int),
         body_of: wp.array(dtype=int),
+        hits: wp.array(dtype=int),
         counts: wp.array(dtype=int),
         starts: wp.array(dtype=int),
         owner: wp.array(dtype=int),
@@ -69,9 +110,12 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
             found = int(0)
             if wp.static(filling):
                 found = starts[i]
-            came = i
-            if wp.static(filling and history):
-                came = sure(came_from[i])
+                number = starts[sure(i + 1)] - found
+                if number < wp.static(HITS):
+                    for k in range(number):
+                        j = sure(hits[sure(wp.static(HITS) * i + k)])
+                        list_pair(sure(found + k), i, j, owner, partner, memory, came_from, old_starts, old_partner, old_memory)
+                    continue
             own = level_of(levels, here[3])
             for k in range(own, levels.shape[0]):
                 one = levels[k]
@@ -95,28 +139,19 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                         dy = real(here[1] - there[1])
                         dz = real(here[2] - there[2])
                         reach = real(there[3] + allowed[j]) + gap
-                        if dx * dx + dy * dy + dz * dz < reach * reach:
-                            apart = bool(True)
-                            if wp.static(bodies):
-                                apart = not of_one_body(member, body_of, i, j)
-                            if not apart:
-                                continue
-                            if wp.static(filling):
+                        within = dx * dx + dy * dy + dz * dz < reach * reach
+                        if wp.static(bodies):
+                            if within:
+                                within = not of_one_body(member, body_of, i, j)
+                        if wp.static(filling):
+                            if within:
                                 at = sure(found)
-                                owner[at] = i
-                                partner[at] = j
-                                if wp.static(history):
-                                    kept = memory_vector()
-                                    was = sure(came_from[j])
-                                    old = listed_at(old_starts, old_partner, came, was)
-                                    if old >= 0:
-                                        kept = old_memory[sure(old)]
-                                    else:
-                                        old = listed_at(old_starts, old_partner, was, came)
-                                        if old >= 0:
-                                            kept = swapped(old_memory[sure(old)])
-                                    memory[at] = kept
-                            found += 1
+                                list_pair(at, i, j, owner, partner, memory, came_from, old_starts, old_partner, old_memory)
+                                found += 1
+                        else:
+                            # All are noted and partners kept by counting on, which spares a branch that nobody can guess.
+                            hits[sure(wp.static(HITS) * i + wp.min(found, wp.static(HITS - 1)))] = j
+                            found += wp.where(within, 1, 0)
             if wp.static(not filling):
                 counts[i] = found
 

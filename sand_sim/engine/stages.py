@@ -122,7 +122,7 @@ def list_stage(arrays: DemArrays, recorder) -> None:
 
     def pairs(filling):
         inputs = [grains.place, cells.levels, cells.low, arrays.in_cells.starts, arrays.allowed, across]
-        inputs += [grains.member, arrays.bodies.body_of if arrays.bodies else None]
+        inputs += [grains.member, arrays.bodies.body_of if arrays.bodies else None, arrays.hits]
         inputs += _list_arguments(arrays, arrays.pair_list)
         recorder.each(neighbours.build_search(arrays.recipe, filling), active, inputs)
 
