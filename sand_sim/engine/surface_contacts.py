@@ -61,12 +61,14 @@ def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         old_memory: wp.array(dtype=memory_vector),
     ):
         for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
-            here = place[i]
-            gap = skin[0] + across
-            reach = wp.float64(here[3]) + gap
             found = int(0)
             if wp.static(filling):
                 found = starts[i]
+                if starts[i + 1] == found:
+                    continue  # none was counted
+            here = place[i]
+            gap = skin[0] + across
+            reach = wp.float64(here[3]) + gap
             for w in range(walls.shape[0]):
                 wall = walls[w]
                 away = from_anchor(here, wall, plungers)

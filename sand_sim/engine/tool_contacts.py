@@ -78,10 +78,12 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         old_memory: wp.array(dtype=memory_vector),
     ):
         for i in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
-            here = origin[i]
             found = int(0)
             if wp.static(filling):
                 found = starts[i]
+                if starts[i + 1] == found:
+                    continue  # none was counted
+            here = origin[i]
             for tool in range(shapes.shape[0]):
                 shape = shapes[tool]
                 state = states[tool]
