@@ -1,7 +1,6 @@
 """A running world: commands in, steps, observations out."""
 
 from dataclasses import astuple, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -42,6 +41,10 @@ _FEWEST_BETWEEN = 100  # steps between two states that are kept, so that keeping
 class World(Changeable):
     """Grains, walls and tools of a scene, settled as it asks.
 
+    Attributes:
+        scene: it was made from.
+        identity: what a state must have in common with it, see ``scene_identity``; told now, because files may go.
+
     Args:
         scene: checked scene.
         progress: called with the name of a stage of the preparation and the share of it that is done, 0 to 1.
@@ -69,6 +72,7 @@ class World(Changeable):
         spheres, poses = observe_spheres(self.assembly), self._poses
         self._swept = SweptGround(spheres, self.assembly.tools, poses)
         self._loaded = replace(self.assembly, solver=None)
+        self.identity = describe_scene(self._loaded)
         self._models: dict[tuple[int, str, float], ToolModel] = {}
         self._initial = self.save()
         self.reset()
@@ -91,11 +95,6 @@ class World(Changeable):
     def observed(self) -> bool:
         """Whether the present state has been observed."""
         return self._observed_steps == self.steps
-
-    @cached_property
-    def identity(self) -> dict:
-        """What a state must have in common with this world, see ``scene_identity``; read off the scene's files once."""
-        return describe_scene(self._loaded)
 
     @property
     def time_step(self) -> float:
