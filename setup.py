@@ -40,7 +40,14 @@ setup(
             "ros-jazzy-rmw-fastrtps-cpp==8.4.3",
         ],
         "figures": ["matplotlib==3.11.2"],
-        "test": ["pytest==9.2.0", "pytest-xdist==3.8.0", "hypothesis==6.170.15", "ruff==0.17.6"],
+        "test": [
+            "pytest==9.2.0",
+            "pytest-xdist==3.8.0",
+            "hypothesis==6.170.15",
+            "ruff==0.17.6",
+            # A DDS implementation that is not the node's own; there are no wheels for other processors.
+            "cyclonedds==11.0.1; sys_platform == 'linux' and platform_machine == 'x86_64'",
+        ],
     },
     entry_points={
         "console_scripts": [

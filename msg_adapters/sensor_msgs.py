@@ -22,8 +22,10 @@ _COLUMNS = {
     "vz": lambda grains: grains.velocity[:, 2],
     "mass": lambda grains: grains.mass,
 }
-POINT_FIELDS = tuple(_COLUMNS)
-USUAL_FIELDS = ("x", "y", "z", "radius", "speed", "id")
+# Files of parameters take a plain y for a truth value, so that lists of single letters must be quoted there.
+_GROUPS = {"position": ("x", "y", "z"), "velocity": ("vx", "vy", "vz")}
+POINT_FIELDS = (*_COLUMNS, *_GROUPS)
+USUAL_FIELDS = ("position", "radius", "speed", "id")
 
 
 def grains_to_cloud(grains: GrainCloud, time: float, frame_id: str, fields: tuple[str, ...] = USUAL_FIELDS) -> PointCloud2:
@@ -33,9 +35,11 @@ def grains_to_cloud(grains: GrainCloud, time: float, frame_id: str, fields: tupl
         grains: all grains.
         time: of the observation [s].
         frame_id: of the world frame.
-        fields: some of ``POINT_FIELDS``: x y z [m], radius [m], speed [m/s], id, vx vy vz [m/s], mass [kg].
+        fields: some of ``POINT_FIELDS``: x y z [m], radius [m], speed [m/s], id, vx vy vz [m/s], mass [kg]; position and
+            velocity for three at once.
     """
-    return columns_to_cloud({name: _COLUMNS[name](grains) for name in fields}, time, frame_id)
+    names = [name for field in fields for name in _GROUPS.get(field, (field,))]
+    return columns_to_cloud({name: _COLUMNS[name](grains) for name in names}, time, frame_id)
 
 
 def columns_to_cloud(columns: dict[str, np.ndarray], time: float, frame_id: str) -> PointCloud2:

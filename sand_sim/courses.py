@@ -148,7 +148,8 @@ class Courses:
         if command.time is None:
             if self.lockstep:
                 raise CommandError(
-                    "no_stamp", f"{tool}: in lockstep a command needs a stamp in simulated time, this one has none"
+                    "no_stamp",
+                    f"{tool}: in lockstep a command needs a stamp in simulated time, this one has none (or stamps:=ignored)",
                 )
             return
         stamp = f"{tool}: stamp {command.time:.6f} s"
@@ -156,10 +157,13 @@ class Courses:
             raise CommandError(
                 "future",
                 f"{stamp} is more than {rules.furthest:g} s ahead of simulated time {now:.6f} s; stamps are simulated "
-                "time (use_sim_time and /clock), or zero for as soon as possible",
+                "time (use_sim_time and /clock), or zero for as soon as possible; with the node's parameter stamps:=ignored "
+                "any are taken for zero",
             )
         if command.time <= course.last_stamp:
-            raise CommandError("out_of_order", f"{stamp} must be later than {course.last_stamp:.6f} s, the stamp before")
+            raise CommandError(
+                "out_of_order", f"{stamp} must be later than {course.last_stamp:.6f} s, the stamp before; reset to begin anew"
+            )
         if self.lockstep and command.time <= now + 0.5 * self._world.time_step:
             raise CommandError("late", f"{stamp} must be later than simulated time {now:.6f} s in lockstep")
         if command.time < now - rules.oldest:

@@ -162,11 +162,21 @@ def test_overlaps_equal_brute_force():
     random = np.random.default_rng(2)
     one, other = random.uniform(0.0, 1.0, (200, 3)), random.uniform(-0.2, 1.3, (500, 3))
     small, large = random.uniform(0.005, 0.05, 200), random.uniform(0.005, 0.12, 500)
-    first, second = overlapping(one, small, other, large)
+    first, second = (np.concatenate(rows) for rows in zip(*overlapping(one, small, other, large), strict=True))
     near = np.linalg.norm(one[:, None] - other, axis=2) < small[:, None] + large
     expected = np.argwhere(near)
     assert len(expected) > 100
     assert sorted(zip(first.tolist(), second.tolist(), strict=True)) == [tuple(pair) for pair in expected.tolist()]
+
+
+def test_many_overlaps_are_counted_in_little_memory_or_refused(tmp_path):
+    world = World(load_scene(write_small_scene(tmp_path)))
+    with pytest.raises(CommandError, match=r"3000 of 3000 grains .* 3000 overlap one another"):
+        world.add_grains(np.full((3000, 3), 0.1), SMALL)
+    with pytest.raises(CommandError, match=r"1\.0e\+12 pairs .* ask for fewer") as refused:
+        world.add_grains(np.full((1_000_000, 3), 0.1), SMALL)
+    assert refused.value.reason == "crowded"
+    assert len(world.observe().grains) == 32
 
 
 def test_stored_energy_goes_with_a_grain(tmp_path):

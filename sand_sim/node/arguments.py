@@ -26,9 +26,13 @@ def read_arguments(request: Request, needed: dict[str, Parameter.Type], optional
     """
     kinds, found = needed | optional, {}
     for parameter in request.parameters:
-        name, kind = parameter.name, Parameter.Type(parameter.value.type)
+        name = parameter.name
         if name not in kinds:
             raise ArgumentError(f"unknown argument '{name[:50]}'; known are {', '.join(kinds)}")
+        try:
+            kind = Parameter.Type(parameter.value.type)
+        except ValueError:
+            raise ArgumentError(f"argument '{name}': there is no type {parameter.value.type}, see ParameterType") from None
         if name in found:
             raise ArgumentError(f"argument '{name}' is given twice")
         if kind != kinds[name] and (kind, kinds[name]) not in _WIDENED:

@@ -6,10 +6,11 @@ from typing import Any
 from rclpy.action import ActionServer
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
-from rclpy.qos_overriding_options import QoSOverridingOptions
+
+from sand_sim.node.quality import overridable, usual_quality, warn_of_publisher, warn_of_subscriber
 
 COMMANDS_DEPTH = 100
 
@@ -28,7 +29,13 @@ class Connections:
 
     def publisher(self, kind: type, topic: str, latched: bool = False) -> Publisher:
         """Reliable, keep last 5, volatile unless latched."""
-        made = self._node.create_publisher(kind, topic, _quality(1 if latched else 5, latched), **_overridable())
+        made = self._made(
+            self._node.create_publisher,
+            kind,
+            topic,
+            qos_profile=usual_quality(1 if latched else 5, latched),
+            event_callbacks=PublisherEventCallbacks(incompatible_qos=warn_of_subscriber(self._node, topic)),
+        )
         self._undo.append(lambda: self._node.destroy_publisher(made))
         return made
 
@@ -45,7 +52,14 @@ class Connections:
                     break
                 hear(taken[0])
 
-        made = self._node.create_subscription(kind, topic, hear_all, _quality(COMMANDS_DEPTH, latched), **_overridable())
+        made = self._made(
+            self._node.create_subscription,
+            kind,
+            topic,
+            hear_all,
+            qos_profile=usual_quality(COMMANDS_DEPTH, latched),
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=warn_of_publisher(self._node, topic)),
+        )
         self._undo.append(lambda: self._node.destroy_subscription(made))
 
     def service(self, kind: type, name: str, answer: Callable) -> None:
@@ -68,13 +82,8 @@ class Connections:
         while self._undo:
             self._undo.pop()()
 
-
-def _quality(depth: int, latched: bool) -> QoSProfile:
-    """A profile of its own for each, because overriding changes it in place."""
-    durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
-    return QoSProfile(reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=depth, durability=durability)
-
-
-def _overridable() -> dict[str, QoSOverridingOptions]:
-    policies = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
-    return {"qos_overriding_options": QoSOverridingOptions(policies)}
+    def _made(self, create: Callable, kind: type, topic: str, *further, **options) -> Any:
+        try:
+            return create(kind, topic, *further, qos_overriding_options=overridable(), **options)
+        except RuntimeError as error:
+            raise ValueError(f"parameters qos_overrides.{self._node.resolve_topic_name(topic)}: {error}") from None

@@ -25,7 +25,11 @@ def main(arguments: list[str] | None = None) -> int:
     from sand_sim.scene.types import SceneError
 
     enlarge_shared_memory()
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        print(f"sand_sim: arguments after --ros-args: {' '.join(str(error).split())}", file=sys.stderr)
+        return 1
     executor, node = SingleThreadedExecutor(), None
     try:
         interruption.check()

@@ -22,6 +22,7 @@ from sand_sim.node.bed_outputs import BedOutputs
 from sand_sim.node.change_services import ChangeServices
 from sand_sim.node.connections import Connections
 from sand_sim.node.diagnosis import Diagnosis
+from sand_sim.node.graph_watch import GraphWatch
 from sand_sim.node.parameters import Parameters, tool_declarations
 from sand_sim.node.robot import read_robot
 from sand_sim.node.services import Services
@@ -223,6 +224,7 @@ class SandSimNode(LifecycleNode):
         else:
             SimulationServices(self, connections, services, self.simulation, inputs.frames, lambda: self._last)
         self._diagnosis = Diagnosis(self.simulation, self.get_name())
+        self._watch = GraphWatch(self, parameters, [tool.name for tool in world.scene.tools])
         connections.timer(_DIAGNOSTICS_PERIOD, self._diagnose)
 
     def _tear_down(self) -> None:
@@ -280,6 +282,7 @@ class SandSimNode(LifecycleNode):
         if self._last is None:
             return
         self._diagnostics.publish(self._diagnosis.tell(self._last, self._bed.dropped))
+        self._watch.look()
         if self.simulation.fault is not None:
             # Whoever comes now still sees the last good state.
             self._publish_state(self._last)

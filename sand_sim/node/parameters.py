@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -123,8 +124,13 @@ class Parameters(Mapping):
         for declaration in declarations:
             if declaration.name in self._declarations:
                 continue
+            try:
+                self._node.declare_parameter(declaration.name, declaration.default, _descriptor(declaration))
+            except InvalidParameterTypeException as error:
+                hint = ", such as 10.0" if isinstance(declaration.default, float) else ""
+                kind = Parameter.Type.from_parameter_value(declaration.default).name.lower().replace("_", " ")
+                raise ValueError(f"parameter {declaration.name}: must be a {kind}{hint}; {error}") from None
             self._declarations[declaration.name] = declaration
-            self._node.declare_parameter(declaration.name, declaration.default, _descriptor(declaration))
             self._values[declaration.name] = self._node.get_parameter(declaration.name).value
             if refusal := _refusal(declaration, self._values[declaration.name]):
                 raise ValueError(f"parameter {declaration.name}: {refusal}")

@@ -50,8 +50,14 @@ class Services:
         """Whether what is asked has been done, and what to say of it."""
         if refusal := self._node.refusal:
             return False, refusal
-        finished = Future(executor=self._node.executor)
-        ask().add_done_callback(lambda done: finished.set_result(_result(done)))
+        executor = self._node.executor
+        finished = Future(executor=executor)
+
+        def finish(done: concurrent.futures.Future) -> None:
+            finished.set_result(_result(done))
+            executor.wake()  # else it sees that only when it wakes for something else
+
+        ask().add_done_callback(finish)
         error, told = await finished
         if error is not None:
             return False, str(error)

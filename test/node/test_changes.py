@@ -12,6 +12,8 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 pytestmark = pytest.mark.xdist_group("processes")
 
 from node_client import PATIENCE, START, Client, drive
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 from scenes import write_small_scene
@@ -89,6 +91,8 @@ def test_grains_come_and_go(client, start_node):
         assert reason in told
     assert not ask(client, "remove_grains")[0]
     assert not ask(client, "remove_grains", id=[4000])[0]
+    odd = SetParametersAtomically.Request(parameters=[ParameterMessage(name="radius", value=ParameterValue(type=200))])
+    assert "there is no type 200" in client.call(SetParametersAtomically, "spawn_grains", odd).result.reason
     assert node.simulation.fault is None
     assert client.call(Trigger, "reset").success
     client.wait_for(lambda: len(cloud_to_points(client.clouds[-1])) == 32)
