@@ -136,11 +136,18 @@ def _unbury(points: np.ndarray, normals: np.ndarray, skin: Skin, solid: Surface)
     if not len(buried):
         return points, normals
     places, up = skin.sample(_PLACES * len(points), np.random.default_rng(2))
+    reach = 3.0 * lattice_spacing(float(skin.areas.sum()), len(points))
+    near = np.zeros(len(places), bool)
+    for i in buried:
+        near |= np.linalg.norm(places - points[i], axis=1) < reach
+    places, up = places[near], up[near]
     open_ = np.abs(solid.winding(places + step * up)) < 0.5
     places, up = places[open_], up[open_]
     for i in buried:
-        k = int(np.argmin(np.linalg.norm(places - points[i], axis=1)))
-        points[i], normals[i] = places[k], up[k]
+        away = np.linalg.norm(places - points[i], axis=1)
+        if len(away) and away.min() < reach:
+            k = int(away.argmin())
+            points[i], normals[i] = places[k], up[k]
     return points, normals
 
 

@@ -2,10 +2,12 @@
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import warp as wp
+
+from sampler.rays import closed_parts, count_leavings
 
 _TOGETHER = 2000  # points below which a second core is not worth its start
 
@@ -174,6 +176,30 @@ class Surface:
 
     def winding(self, points: np.ndarray) -> np.ndarray:
         """Generalized winding number of points, shape (n, 3) [m]: 1 inside, 0 outside of a closed surface."""
+        closed = self._closed
+        if not closed.any():
+            return self._solid_angles(points)
+        number = np.zeros(len(points), np.float32)
+        if not closed.all():
+            number += self._open_parts._solid_angles(points)
+        part = self if closed.all() else self._closed_parts
+        whole = wp.empty(len(points), dtype=int, device=self.device)
+        part._launch(count_leavings, [part.shift(points)], [whole])
+        return number + whole.numpy().astype(np.float32)
+
+    @cached_property
+    def _closed(self) -> np.ndarray:
+        return closed_parts(self.triangles)
+
+    @cached_property
+    def _closed_parts(self) -> "Surface":
+        return Surface(self.triangles[self._closed], self.device)
+
+    @cached_property
+    def _open_parts(self) -> "Surface":
+        return Surface(self.triangles[~self._closed], self.device)
+
+    def _solid_angles(self, points: np.ndarray) -> np.ndarray:
         number = wp.empty(len(points), dtype=float, device=self.device)
         self._launch(find_winding, [self.shift(points)], [number])
         return number.numpy()
