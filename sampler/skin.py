@@ -9,7 +9,7 @@ _STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what 
 _TRIAL = 4000  # random places that show whether anything is buried at all
 _DEEPEST = 20  # halvings of a triangle that is partly buried
 _ISLAND, _FINEST = 1.5, 0.15  # triangles larger than this may hold islands; smaller ones are not cut further; in spacings
-_MOST = 8_000  # partly buried triangles after which none is cut further
+_MOST = 10  # partly buried triangles per particle to come, after which only large ones are cut
 
 
 class Skin(Surface):
@@ -51,10 +51,11 @@ def free_triangles(
     if _free(places, normals, around, two_sided).all():
         return triangles, parent
     coincide = np.any(coincidence(places, normals, around) > 1)
+    most = _MOST * float(Surface.areas_of(triangles).sum()) / spacing**2
     pieces, parents, mixed = [], [], 0
     for depth in range(_DEEPEST + 1):
         edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
-        cut = (edge > _FINEST * spacing) & (depth < _DEEPEST) & (mixed < _MOST)
+        cut = (edge > (_FINEST if mixed < most else _ISLAND) * spacing) & (depth < _DEEPEST)
         cut[cut] = crossed_pieces(triangles[cut], around, _STEP * around.unit)
         small = np.flatnonzero(cut & (edge <= _ISLAND * spacing))
         cut[small] = _is_mixed(triangles[small], around, coincide)

@@ -7,9 +7,10 @@ from functools import cache, cached_property
 import numpy as np
 import warp as wp
 
-from sampler.rays import closed_parts, count_leavings
+from sampler.rays import closing_cone, count_leavings
 
 _TOGETHER = 2000  # points below which a second core is not worth its start
+_RAGGED = 0.5  # open edges per triangle from which solid angles are as fast
 
 
 # Warp's own query loses up to 1e-4 of the diagonal on long thin triangles: it measures them in single precision.
@@ -176,28 +177,23 @@ class Surface:
 
     def winding(self, points: np.ndarray) -> np.ndarray:
         """Generalized winding number of points, shape (n, 3) [m]: 1 inside, 0 outside of a closed surface."""
-        closed = self._closed
-        if not closed.any():
+        cone, closed = self._closing
+        if closed is None:
             return self._solid_angles(points)
-        number = np.zeros(len(points), np.float32)
-        if not closed.all():
-            number += self._open_parts._solid_angles(points)
-        part = self if closed.all() else self._closed_parts
         whole = wp.empty(len(points), dtype=int, device=self.device)
-        part._launch(count_leavings, [part.shift(points)], [whole])
-        return number + whole.numpy().astype(np.float32)
+        closed._launch(count_leavings, [closed.shift(points)], [whole])
+        number = whole.numpy().astype(np.float32)
+        return number - cone._solid_angles(points) if cone else number
 
     @cached_property
-    def _closed(self) -> np.ndarray:
-        return closed_parts(self.triangles)
-
-    @cached_property
-    def _closed_parts(self) -> "Surface":
-        return Surface(self.triangles[self._closed], self.device)
-
-    @cached_property
-    def _open_parts(self) -> "Surface":
-        return Surface(self.triangles[~self._closed], self.device)
+    def _closing(self) -> tuple["Surface | None", "Surface | None"]:
+        """What closes the surface, and both together; nothing where there is too much to close."""
+        cone = closing_cone(self.triangles)
+        if not len(cone):
+            return None, self
+        if len(cone) > _RAGGED * len(self.triangles):
+            return None, None
+        return Surface(cone, self.device), Surface(np.concatenate([self.triangles, cone]), self.device)
 
     def _solid_angles(self, points: np.ndarray) -> np.ndarray:
         number = wp.empty(len(points), dtype=float, device=self.device)
