@@ -24,6 +24,7 @@ _TRIES, _FINER = 4, 0.92
 _WALL_SAMPLES = 4000
 _PLACES = 60  # per particle, to move buried ones to
 _HALVINGS = 8  # of the way there, to move no farther than needed
+_CROWDED = 0.4  # distance from another particle, in spacings, below which one that was moved goes where there is most room
 
 Progress = Callable[[float], None]
 
@@ -159,6 +160,13 @@ def _unbury(points: np.ndarray, normals: np.ndarray, skin: Skin, solid: Surface)
         free = is_free(trial, skin.normals[face])
         points[buried[free]], normals[buried[free]] = trial[free], skin.normals[face[free]]
         inside, outside = np.where(free[:, None], inside, share), np.where(free[:, None], share, outside)
+    for i in buried:
+        away = np.linalg.norm(points - points[i], axis=1)
+        others = points[(away < 2.0 * reach) & (np.arange(len(points)) != i)]
+        around = np.flatnonzero(np.linalg.norm(places - points[i], axis=1) < reach)
+        if len(others) and len(around) and np.partition(away, 1)[1] < _CROWDED * reach:
+            k = around[np.argmax(np.linalg.norm(places[around, None] - others, axis=2).min(axis=1))]
+            points[i], normals[i] = places[k], up[k]
     return points, normals
 
 
