@@ -16,7 +16,6 @@ _LEAVINGS = """
     using namespace wp;
     const Mesh mesh = mesh_get(id);
     const double sx = lean[0], sy = lean[1];
-    const float steep[2] = {lean[0], lean[1]};
     int stack[BVH_QUERY_STACK_SIZE];
     int count = 1, leavings = 0;
     stack[0] = *mesh.bvh.root;
@@ -25,11 +24,11 @@ _LEAVINGS = """
         const BVHPackedNodeHalf low = bvh_load_node(mesh.bvh.node_lowers, node);
         const BVHPackedNodeHalf high = bvh_load_node(mesh.bvh.node_uppers, node);
         const float below[2] = {low.x - p[0], low.y - p[1]}, above[2] = {high.x - p[0], high.y - p[1]};
-        float enter = (low.z - p[2] > 0.0f ? low.z - p[2] : 0.0f), leave = high.z - p[2];
+        float enter = low.z - p[2] > 0.0f ? low.z - p[2] : 0.0f, leave = high.z - p[2];
         for (int k = 0; k < 2; ++k) {
-            const float a = below[k] / steep[k], b = above[k] / steep[k];
-            enter = max(enter, min(a, b));
-            leave = min(leave, max(a, b));
+            const float a = below[k] / lean[k], b = above[k] / lean[k];  // the lean is positive
+            enter = a > enter ? a : enter;
+            leave = b < leave ? b : leave;
         }
         if (enter > leave + 1e-5f) continue;
         if (!low.b) {
