@@ -72,13 +72,13 @@ def span_loop(vertices: np.ndarray, loop: np.ndarray) -> np.ndarray:
     cost = np.zeros((number, number))
     split = np.zeros((number, number), int)
     for width in range(2, number):
-        for i in range(number - width):
-            j = i + width
-            between = corner[i + 1 : j]
-            area = 0.5 * np.linalg.norm(np.cross(between - corner[i], corner[j] - corner[i]), axis=1)
-            total = cost[i, i + 1 : j] + cost[i + 1 : j, j] + area
-            split[i, j] = i + 1 + int(total.argmin())
-            cost[i, j] = total.min()
+        i = np.arange(number - width)
+        j = i + width
+        k = i[:, None] + np.arange(1, width)
+        spanned = np.cross(corner[k] - corner[i, None], (corner[j] - corner[i])[:, None])
+        total = cost[i[:, None], k] + cost[k, j[:, None]] + 0.5 * np.linalg.norm(spanned, axis=2)
+        split[i, j] = i + 1 + total.argmin(axis=1)
+        cost[i, j] = total.min(axis=1)
     waiting = [(0, number - 1)]
     while waiting:
         i, j = waiting.pop()

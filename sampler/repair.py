@@ -20,6 +20,7 @@ SOLID, CAP, SHEET = 0, 1, 2
 
 _SHEET = 0.10  # a component is a sheet if closing it takes more area than this share of its own
 _ENCLOSED = 0.9  # share of the area that must have an inside for loose pieces to count as one solid
+_ASKED = 4000  # faces are enough to tell that share
 _FEW = 8  # faces of a component in which a hole of three corners is nothing special
 _SCATTERED = 50  # open pieces from which a mesh is likely to be a cracked solid
 _CRUMB = 0.01  # share of the area below which one of many open pieces is part of a cracked surface
@@ -198,6 +199,7 @@ def _enclosing(triangles: np.ndarray, open_: np.ndarray, lenient: bool) -> bool:
     """Whether open pieces, with everything else, have an inside behind and an outside before nearly all of their area."""
     surface = Surface(triangles)
     asked = np.flatnonzero(open_ & (surface.areas > 0.0))
+    asked = asked[:: 1 + len(asked) // _ASKED]
     centre, step = surface.triangles[asked].mean(axis=1), 1e-4 * surface.unit * surface.normals[asked]
     before, behind = surface.winding(centre + step), surface.winding(centre - step)
     doubt = 0.25 if lenient else 0.1

@@ -23,6 +23,8 @@ _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
 _WALL_SAMPLES = 4000
 _PLACES = 60  # per particle, to move buried ones to
+_HALVINGS = 8  # of the way there, to move no farther than needed
+_CROWDED = 0.4  # distance from another particle, in spacings, below which one that was moved goes where there is most room
 
 Progress = Callable[[float], None]
 
@@ -130,17 +132,41 @@ def sample_body(
 
 
 def _unbury(points: np.ndarray, normals: np.ndarray, skin: Skin, solid: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Move particles at the border of a cut surface that are still a little inside another part to the nearest free place."""
-    step = 2e-5 * solid.unit
-    buried = np.flatnonzero(np.abs(solid.winding(points + step * normals)) > 0.5)
+    """Move particles that are a little inside another part, at the border of a cut surface, to just outside of it."""
+
+    def is_free(places, up):
+        return np.abs(solid.winding(places + 2e-5 * solid.unit * up)) < 0.5
+
+    buried = np.flatnonzero(~is_free(points, normals))
     if not len(buried):
         return points, normals
+    reach = lattice_spacing(float(skin.areas.sum()), len(points))
     places, up = skin.sample(_PLACES * len(points), np.random.default_rng(2))
-    open_ = np.abs(solid.winding(places + step * up)) < 0.5
-    places, up = places[open_], up[open_]
+    near = np.zeros(len(places), bool)
     for i in buried:
-        k = int(np.argmin(np.linalg.norm(places - points[i], axis=1)))
-        points[i], normals[i] = places[k], up[k]
+        near |= np.linalg.norm(places - points[i], axis=1) < reach
+    places, up = places[near], up[near]
+    open_ = is_free(places, up)
+    places, up = places[open_], up[open_]
+    if not len(places):
+        return points, normals
+    nearest = np.array([np.argmin(np.linalg.norm(places - points[i], axis=1)) for i in buried])
+    begin, end = points[buried], places[nearest]
+    points[buried], normals[buried] = end, up[nearest]
+    inside, outside = np.zeros((len(buried), 1)), np.ones((len(buried), 1))
+    for _ in range(_HALVINGS):
+        share = 0.5 * (inside + outside)
+        trial, face = skin.closest(begin + share * (end - begin))
+        free = is_free(trial, skin.normals[face])
+        points[buried[free]], normals[buried[free]] = trial[free], skin.normals[face[free]]
+        inside, outside = np.where(free[:, None], inside, share), np.where(free[:, None], share, outside)
+    for i in buried:
+        away = np.linalg.norm(points - points[i], axis=1)
+        others = points[(away < 2.0 * reach) & (np.arange(len(points)) != i)]
+        around = np.flatnonzero(np.linalg.norm(places - points[i], axis=1) < reach)
+        if len(others) and len(around) and np.partition(away, 1)[1] < _CROWDED * reach:
+            k = around[np.argmax(np.linalg.norm(places[around, None] - others, axis=2).min(axis=1))]
+            points[i], normals[i] = places[k], up[k]
     return points, normals
 
 

@@ -2,14 +2,14 @@
 
 import numpy as np
 
+from sampler.crossing import crossed_pieces
 from sampler.surface import Surface
 
 _STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what is there
 _TRIAL = 4000  # random places that show whether anything is buried at all
 _DEEPEST = 20  # halvings of a triangle that is partly buried
 _ISLAND, _FINEST = 1.5, 0.15  # triangles larger than this may hold islands; smaller ones are not cut further; in spacings
-_SEARCHED = 12  # halvings in search of islands
-_MOST = 8_000  # partly buried triangles after which none is cut further
+_MOST = 10  # partly buried triangles per particle to come, after which only large ones are cut
 
 
 class Skin(Surface):
@@ -48,37 +48,47 @@ def free_triangles(
     parent = np.flatnonzero(Surface.areas_of(triangles) > 0.0)
     triangles = triangles[parent]
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
-    if _free(places, normals, around, two_sided)[0].all():
+    if _free(places, normals, around, two_sided).all():
         return triangles, parent
     coincide = np.any(coincidence(places, normals, around) > 1)
-    kept, parents, mixed = [], [], 0
+    most = _MOST * float(Surface.areas_of(triangles).sum()) / spacing**2
+    pieces, parents, mixed = [], [], 0
     for depth in range(_DEEPEST + 1):
-        normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        centre = triangles.mean(axis=1)
-        free, before = _free(centre, normal, around, two_sided)
         edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
-        open_ = (edge > _FINEST * spacing) & (depth < _DEEPEST) & (mixed < _MOST)
-        large = triangles[open_]
-        rim = np.concatenate([large, 0.5 * (large + np.roll(large, -1, axis=1))], axis=1)  # corners and midpoints
-        rim = 0.98 * rim + 0.02 * centre[open_, None] + _STEP * around.unit * normal[open_, None]
-        same = (np.abs(around.winding(rim.reshape(-1, 3))) < 0.5).reshape(-1, 6) == before[open_, None]
-        if coincide and len(rim):  # where two surfaces part, pieces end, so that each is covered as often all over
-            behind = rim - 2.0 * _STEP * around.unit * normal[open_, None]
-            depths = np.rint(np.abs(around.winding(behind.reshape(-1, 3)))).reshape(-1, 6)
-            middle = np.rint(np.abs(around.winding(centre[open_] - _STEP * around.unit * normal[open_])))
-            same &= depths == middle[:, None]
-        # A large triangle may hold an island; only small ones are believed by their rims.
-        cut = np.zeros(len(triangles), bool)
-        cut[open_] = ~same.all(axis=1) | ((edge[open_] > _ISLAND * spacing) & (depth < _SEARCHED))
-        mixed += int((~same.all(axis=1)).sum())
-        keep = free & ~cut
-        kept.append(triangles[keep])
-        parents.append(parent[keep])
+        cut = (edge > (_FINEST if mixed < most else _ISLAND) * spacing) & (depth < _DEEPEST)
+        cut[cut] = crossed_pieces(triangles[cut], around, _STEP * around.unit)
+        small = np.flatnonzero(cut & (edge <= _ISLAND * spacing))
+        cut[small] = _is_mixed(triangles[small], around, coincide)
+        mixed += int(cut[small].sum())
+        pieces.append(triangles[~cut])
+        parents.append(parent[~cut])
         triangles, parent = _halve(triangles[cut]), np.tile(parent[cut], 2)
         if not len(triangles):
             break
-    return np.concatenate(kept), np.concatenate(parents)
+    pieces, parents = np.concatenate(pieces), np.concatenate(parents)
+    free = _free(pieces.mean(axis=1), _normals(pieces), around, two_sided)
+    return pieces[free], parents[free]
+
+
+def _is_mixed(pieces: np.ndarray, around: Surface, coincide: bool) -> np.ndarray:
+    """Whether what lies before a piece at its rim differs from what lies before its middle; behind it, too, if asked for.
+
+    Where two surfaces that coincide part, pieces must end, so that each is covered as often all over.
+    """
+    centre, normal = pieces.mean(axis=1, keepdims=True), _normals(pieces)[:, None]
+    rim = np.concatenate([pieces, 0.5 * (pieces + np.roll(pieces, -1, axis=1))], axis=1)  # corners and midpoints
+    places = np.concatenate([centre, 0.98 * rim + 0.02 * centre], axis=1)
+    mixed = np.zeros(len(pieces), bool)
+    for side in (1.0, -1.0) if coincide else (1.0,):
+        number = np.abs(around.winding((places + side * _STEP * around.unit * normal).reshape(-1, 3))).reshape(-1, 7)
+        state = number < 0.5 if side > 0.0 else np.rint(number)
+        mixed |= np.any(state != state[:, :1], axis=1)
+    return mixed
+
+
+def _normals(triangles: np.ndarray) -> np.ndarray:
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
 
 
 def coincidence(points: np.ndarray, normals: np.ndarray, around: Surface) -> np.ndarray:
@@ -88,12 +98,12 @@ def coincidence(points: np.ndarray, normals: np.ndarray, around: Surface) -> np.
     return np.maximum(np.rint(behind - before), 1).astype(int)
 
 
-def _free(points: np.ndarray, normals: np.ndarray, around: Surface, two_sided: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Whether places of a surface are free, and whether the outside is before them."""
+def _free(points: np.ndarray, normals: np.ndarray, around: Surface, two_sided: bool) -> np.ndarray:
+    """Whether places of a surface are free."""
     step = _STEP * around.unit * normals
     before = np.abs(around.winding(points + step)) < 0.5
     behind = np.abs(around.winding(points - step)) < 0.5
-    return (before | behind) if two_sided else (before != behind), before
+    return (before | behind) if two_sided else (before != behind)
 
 
 def _halve(triangles: np.ndarray) -> np.ndarray:

@@ -105,6 +105,17 @@ def union_volume(ball, box):
     return ball.volume + box.volume * np.mean(radius > 0.0499)
 
 
+def test_posts_through_a_plate_leave_it_evenly_covered():
+    parts = [trimesh.creation.box((2.0, 1.0, 0.2))]
+    for k in range(9):
+        post = trimesh.creation.cylinder(0.15, 1.0, sections=40)
+        post.apply_transform(trimesh.transformations.rotation_matrix(0.5, [0.3, 1.0, 0.0]))
+        parts.append(post.apply_translation([0.2 * k - 0.8, 0.1 * (-1) ** k, 0.05]))
+    evenness = sample_body(trimesh.util.concatenate(parts), radius=0.02, count=2000).evenness
+    assert evenness.nearest > 0.35
+    assert evenness.coverage < 0.85
+
+
 @pytest.mark.parametrize("grain", [0.004, 0.001, 0.0004])
 def test_no_grain_can_pass(grain):
     mesh = wavy_ball()

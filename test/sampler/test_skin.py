@@ -1,0 +1,66 @@
+"""What of a surface can be touched, against closed forms."""
+
+import numpy as np
+import pytest
+import trimesh
+from shapes import solid_angle_inside
+
+from sampler.skin import free_triangles
+from sampler.surface import Surface
+
+
+def box(extents, centre):
+    return trimesh.creation.box(extents, trimesh.transformations.translation_matrix(centre))
+
+
+def free_parts(*meshes, spacing=0.05):
+    triangles = np.concatenate([mesh.triangles for mesh in meshes])
+    return free_triangles(triangles, Surface(triangles), spacing)
+
+
+def test_two_crossing_bars_hide_what_lies_in_the_other():
+    free, _ = free_parts(box((2.0, 0.4, 0.4), (0, 0, 0)), box((0.3, 2.0, 0.3), (0, 0, 0)))
+    own = 4 * 2.0 * 0.4 + 2 * 0.4**2 - 2 * 0.3 * 0.3
+    other = 4 * (2.0 - 0.4) * 0.3 + 2 * 0.3**2
+    assert Surface.areas_of(free).sum() == pytest.approx(own + other, rel=2e-3)
+
+
+def test_only_what_another_part_comes_through_is_cut():
+    far = box((1.0, 1.0, 1.0), (5.0, 0, 0))
+    post = box((0.1, 0.1, 1.0), (0.07, 0.13, 0.5))  # stands in the middle of two large faces of the plate
+    free, parent = free_parts(box((2.0, 2.0, 0.2), (0, 0, 0)), post, far)
+    assert np.count_nonzero(parent >= 24) == 12
+    plate = Surface.areas_of(free[parent < 12]).sum()
+    assert plate == pytest.approx(2 * 4.0 + 4 * 2.0 * 0.2 - 0.1 * 0.1, rel=2e-4)
+
+
+def off_surface(surface, points):
+    return points[np.linalg.norm(points - surface.closest(points)[0], axis=1) > 1e-4]
+
+
+def test_winding_numbers_of_closed_surfaces_are_whole():
+    balls = [trimesh.creation.icosphere(3).apply_translation([x, 0.1, 0.2]) for x in (0.0, 0.8)]
+    surface = Surface(np.concatenate([ball.triangles for ball in balls]))
+    points = off_surface(surface, np.random.default_rng(0).uniform(-1.5, 2.5, (3000, 3)))
+    exact = np.sum([solid_angle_inside(np.asarray(ball.triangles), points) for ball in balls], axis=0)
+    assert np.array_equal(surface.winding(points), exact)
+
+
+def test_winding_numbers_of_open_surfaces_are_their_solid_angles():
+    whole = trimesh.creation.box((1.0, 1.0, 1.0)).subdivide().subdivide().subdivide().subdivide()
+    bucket = np.asarray(whole.triangles)[whole.triangles_center[:, 2] < 0.4999]
+    height = np.linspace(-0.9, 3.0, 50)
+    way = np.abs(0.5 - height)
+    lid = np.arcsin(0.25 / (0.25 + way**2)) / np.pi  # of the square that is missing, seen from its axis
+    expected = np.where(np.abs(height) < 0.5, 1.0 - lid, np.where(height > 0.0, lid, -lid))
+    found = Surface(bucket).winding(np.stack([0.0 * height, 0.0 * height, height], axis=1))
+    assert found == pytest.approx(expected, abs=1e-3)
+
+
+def test_no_piece_is_given_up_where_many_parts_cross():
+    number, tooth = 21, (0.01, 1.5, 0.5)  # a comb of thin teeth through a plate
+    teeth = [box(tooth, (0.08 * k - 0.8, 0.0, 0.0)) for k in range(number)]
+    free, _ = free_parts(box((2.0, 2.0, 0.2), (0, 0, 0)), *teeth, spacing=0.04)
+    whole = 2 * 4.0 + 4 * 2.0 * 0.2 + number * 2 * (0.01 * 1.5 + 0.01 * 0.5 + 1.5 * 0.5)
+    hidden = number * (2 * 0.01 * 1.5 + 2 * 0.2 * (1.5 + 0.01))
+    assert Surface.areas_of(free).sum() == pytest.approx(whole - hidden, rel=5e-3)
