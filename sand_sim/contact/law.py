@@ -55,6 +55,9 @@ class PairNumbers:
 class Law:
     """A choice for a slot.
 
+    Its function chooses between numbers, not between vectors, where it branches, and calls no library that knows one number at a
+    time; else the compiler could not do many contacts at once, see ``engine/pair_tiles.py``.
+
     Attributes:
         build: ``build(precision, types)`` gives the Warp function of the slot; its docstring is the law.
         fields: numbers it reads from ``MaterialPair``, name to ``[unit] meaning``.
@@ -63,7 +66,6 @@ class Law:
         memory: sign by which each remembered number changes when the bodies of a contact swap roles; its length is how many.
         rotation: whether it can turn a sphere.
         build_energy: ``build_energy(precision, types)`` gives the Warp function for the energy stored in the law's springs.
-        wide: whether a compiler can do many contacts at once: branches choose between numbers, not vectors; no library is called.
     """
 
     build: Callable
@@ -73,7 +75,6 @@ class Law:
     asks: tuple[str, ...] = ()
     memory: tuple[int, ...] = ()
     rotation: bool = False
-    wide: bool = True
 
 
 NONE = Law(build=lambda precision, types: None)

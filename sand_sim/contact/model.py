@@ -70,11 +70,6 @@ class ContactModel:
         return self.cohesion != "none"
 
     @property
-    def wide(self) -> bool:
-        """Whether a compiler can do many contacts at once."""
-        return all(law.wide for law in self.laws.values())
-
-    @property
     def asks(self) -> tuple[str, ...]:
         """Numbers that the scene must give for each pair of materials."""
         return tuple(dict.fromkeys(ask for law in self.laws.values() for ask in law.asks))

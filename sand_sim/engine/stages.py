@@ -190,7 +190,7 @@ def pair_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
     contacts = arrays.pair_list
     inputs = [*_grain_arguments(arrays, contacts), *_act_arguments(arrays, "pair")]
     recipe, last = arrays.recipe, not (arrays.walls or arrays.tools)
-    if recorder.vectors and recipe.contact.wide and not measuring:
+    if recorder.vectors and not measuring:
         kernel = pair_tiles.build_pair_tiles(recipe)
     else:
         kernel = pair_forces.build_pair_forces(recipe, measuring)

@@ -20,7 +20,7 @@ from sand_sim.precision import DOUBLE
 
 LAWS = {f"{slot} {law}": ContactModel(**{slot: law}) for slot, laws in SLOTS.items() for law in laws}
 DIFFERENT = {model: name for name, model in LAWS.items()}
-RECIPES = {name: Recipe(contact=model) for model, name in DIFFERENT.items() if model.wide} | {
+RECIPES = {name: Recipe(contact=model) for model, name in DIFFERENT.items()} | {
     "all": Recipe(contact=ContactModel(rolling="spring", twisting="marshall", cohesion="capillary"), materials=True),
     "rolling and cohesion": Recipe(contact=ContactModel(rolling="spring", cohesion="dmt")),
     "rescaled and twisting": Recipe(contact=ContactModel(tangential="mindlin_rescaled", twisting="marshall")),
@@ -29,10 +29,6 @@ RECIPES = {name: Recipe(contact=model) for model, name in DIFFERENT.items() if m
 RECIPES |= {f"{name}, double": replace(RECIPES[name], precision=DOUBLE) for name in ("tangential linear", "all")}
 QUIET = {key: value for key, value in kernel.keywords.items() if key != "module_options"}
 every_recipe = pytest.mark.parametrize("name", RECIPES)
-
-
-def test_only_one_law_is_too_complicated():
-    assert {name for name, model in LAWS.items() if not model.wide} == {"cohesion jkr"}
 
 
 @every_recipe
