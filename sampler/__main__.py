@@ -1,7 +1,6 @@
 """``python -m sampler MESH --radius R``: make a particle body and say what came out."""
 
 import argparse
-import os
 import sys
 import time
 from pathlib import Path
@@ -27,14 +26,15 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    _start_warp()
     from sampler.cache import sample_file
     from sampler.distance import SignedDistance
     from sampler.location import locate_mesh
+    from sampler.quiet import start_warp
     from sampler.reading import read_mesh
     from sampler.report import report_table
     from sampler.storage import save_body
 
+    start_warp()
     begin = time.perf_counter()
     path = locate_mesh(options.mesh)
     recording = None
@@ -68,21 +68,6 @@ def _run(options: argparse.Namespace) -> int:
         if written:
             print(f"wrote {written}")
     return 0
-
-
-def _start_warp() -> None:
-    """Start Warp without its greeting, and without the line that its library writes where there is no driver of a GPU."""
-    import warp as wp
-
-    wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
-    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        wp.init()
-    finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)
-        os.close(nowhere)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -1,25 +1,12 @@
 """The one way kernels are declared, and Warp started: quietly, without backward passes, one small module for each kernel."""
 
-import os
 from functools import cache, partial
 
 import warp as wp
 
+from sampler.quiet import start_warp
 
-def _start_warp() -> None:
-    """Start Warp without its greeting, and without the line it writes to stderr on every machine that has no NVIDIA driver."""
-    wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
-    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        wp.init()
-    finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)
-        os.close(nowhere)
-
-
-_start_warp()
+start_warp()
 
 # Fused multiply-add makes the contact kernels a tenth faster; Warp's own flags leave it to the back end, which finds few.
 _OPTIONS = {"cpu_compiler_flags": f"{wp.config.cpu_compiler_flags} -ffp-contract=fast"}

@@ -1,0 +1,18 @@
+"""Warp's start without words."""
+
+import os
+
+import warp as wp
+
+
+def start_warp() -> None:
+    """Start Warp without its greeting, and without the line that its library writes to stderr where no GPU has a driver."""
+    wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
+    stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        wp.init()
+    finally:
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        os.close(nowhere)
