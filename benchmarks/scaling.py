@@ -16,6 +16,8 @@ from sand_sim import World, read_scene
 SIZES = {1000: ("bed_1000", (1, 1)), 8000: ("tile_8000", (1, 1)), 64_000: ("tile_8000", (4, 2))}
 SIZES |= {256_000: ("tile_8000", (8, 4)), 1_000_000: ("tile_8000", (25, 5))}  # bed and its images along x and y
 
+RUN_IN = 400  # steps; the first lists are wide, because nobody knows yet how fast the grains move
+
 
 def time_scaling(setup: Setup, sizes: dict[int, tuple[str, tuple[int, int]]] = SIZES) -> Iterator[dict]:
     """One row for each size, on the largest number of cores asked for; all sizes run in turn."""
@@ -28,6 +30,9 @@ def time_scaling(setup: Setup, sizes: dict[int, tuple[str, tuple[int, int]]] = S
         workloads[number, threads] = Workload(f"{number}", repeated_world(bed, tiles, setup, solver={"threads": threads}))
         gc.collect()
         resident[number] = (resident_bytes() - before) / number
+    for workload in workloads.values():
+        setup.progress(f"running in a bed of {workload.name} grains", 0.0)
+        workload.run(RUN_IN)
     times, faults = time_in_turn(workloads, setup)
     for (number, _), workload in workloads.items():
         row = speed_row("scaling", f"{number}", threads, workload, times[number, threads], faults.get((number, threads)))

@@ -42,8 +42,8 @@ def _acting(arrays, tool: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     """Row of the grain, force [N] and moment [N m] on it, and lever from the tool's origin [m], of each contact that acts."""
     contacts = arrays.tool_list
     number = contacts.pairs.get()
-    force, lever = contacts.force.numpy()[:number], arrays.lever.numpy()[:number]
+    force, lever = contacts.force.numpy()[:number, :3], arrays.lever.numpy()[:number]
     own = arrays.tools.tool_of.numpy()[contacts.partner.numpy()[:number]] == tool
     chosen = np.flatnonzero(own & (force.any(axis=1) | lever.any(axis=1)))  # of a contact let go both are zero
-    moment = np.zeros((len(chosen), 3)) if contacts.moment is None else contacts.moment.numpy()[chosen].astype(float)
+    moment = np.zeros((len(chosen), 3)) if contacts.moment is None else contacts.moment.numpy()[chosen, :3].astype(float)
     return contacts.owner.numpy()[chosen], force[chosen].astype(float), moment, lever[chosen].astype(float)

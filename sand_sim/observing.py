@@ -172,7 +172,7 @@ def observe_walls(assembly: Assembly) -> tuple[WallReport, ...]:
         contacts, surfaces = arrays.wall_list, arrays.walls.numpy()
         number = contacts.pairs.get()
         wall = np.searchsorted(surfaces["first"], contacts.partner.numpy()[:number], side="right") - 1
-        force = contacts.force.numpy()[:number].astype(float)
+        force = contacts.force.numpy()[:number, :3].astype(float)
         totals = np.column_stack([np.bincount(wall, force[:, k], len(assembly.walls)) for k in range(3)]).astype(float)
         states = arrays.plungers.states.numpy() if arrays.plungers else None
         for one, total, plunger in zip(assembly.walls, totals, surfaces["plunger"], strict=True):
@@ -223,7 +223,7 @@ def momentum_residual(assembly: Assembly) -> float:
     outer = mass.sum() * gravity
     size = np.abs(force).sum() + np.abs(outer).sum()
     if arrays.wall_list:
-        on_walls = arrays.wall_list.force.numpy()[: arrays.wall_list.pairs.get()].astype(float)
+        on_walls = arrays.wall_list.force.numpy()[: arrays.wall_list.pairs.get(), :3].astype(float)
         outer, size = outer + on_walls.sum(axis=0), size + np.abs(on_walls).sum()
     if arrays.tools:
         on_tools = arrays.tools.wrench.numpy()[:, 0]

@@ -35,7 +35,7 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
         measuring: write the energy stored in the contact too, and let nothing else outlast this call.
     """
     precision, rotation, history, couples = recipe.precision, recipe.rotation, recipe.history, recipe.contact.couples
-    real, vec3, vec4 = precision.real, precision.vec3, precision.vec4
+    real, vec4 = precision.real, precision.vec4
     types, memory_vector = recipe.contact.types(precision), memory_type(recipe.contact, precision)
     response = build_response(recipe.contact, precision)
     stored_energy = build_stored_energy(recipe.contact, precision)
@@ -51,9 +51,9 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
         lane: int,
         depth: real,
         memory: wp.array(dtype=memory_vector),
-        force: wp.array(dtype=vec3),
+        force: wp.array(dtype=vec4),
         couple: wp.array(dtype=vec4),
-        moment: wp.array(dtype=vec3),
+        moment: wp.array(dtype=vec4),
         deepest: wp.array(dtype=real),
         energy: wp.array(dtype=real),
     ):
@@ -61,12 +61,13 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
         if wp.static(history):
             before = memory[contact]
         push, drag, resistance, after = response(met, pair, before, dt)
-        force[contact] = met.normal * push + drag
+        pushed = met.normal * push + drag
+        force[contact] = vec4(pushed[0], pushed[1], pushed[2], real(0.0))
         if wp.static(rotation):
             turn = wp.cross(drag, met.normal)
             couple[contact] = vec4(turn[0], turn[1], turn[2], arm_loss)
         if wp.static(couples):
-            moment[contact] = resistance
+            moment[contact] = vec4(resistance[0], resistance[1], resistance[2], real(0.0))
         if depth > deepest[lane]:
             wp.atomic_max(deepest, lane, depth)
         if wp.static(measuring):
@@ -83,16 +84,16 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
     def release(
         contact: int,
         memory: wp.array(dtype=memory_vector),
-        force: wp.array(dtype=vec3),
+        force: wp.array(dtype=vec4),
         couple: wp.array(dtype=vec4),
-        moment: wp.array(dtype=vec3),
+        moment: wp.array(dtype=vec4),
         energy: wp.array(dtype=real),
     ):
-        force[contact] = vec3(real(0.0))
+        force[contact] = vec4(real(0.0))
         if wp.static(rotation):
             couple[contact] = vec4(real(0.0))
         if wp.static(couples):
-            moment[contact] = vec3(real(0.0))
+            moment[contact] = vec4(real(0.0))
         if wp.static(measuring):
             energy[contact] = real(0.0)
         elif wp.static(history):

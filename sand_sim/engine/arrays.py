@@ -150,10 +150,11 @@ class DemArrays:
             name: Lender(c.old_partner, self.device).lend(precision.real, c.pairs.capacity) for name, c in self.lists.items()
         }
         number = self.grains.capacity
-        sorting = Lender(self.pair_list.force, self.device)
+        pairs, room = self.pair_list, self.pair_list.pairs.capacity
+        sorting = Lender(pairs.force[:room], self.device)
         self.keys, order = sorting.lend(int, number), sorting.lend(int, number)
         self.in_cells = replace(self.in_cells, order=order, cursor=sorting.lend(int, self.cells.bins.capacity))
-        filling = Lender(self.pair_list.couple, self.device)
+        filling = Lender(pairs.couple and pairs.couple[:room], self.device)
         counts, old_starts, met_cursor = (filling.lend(int, number + 1) for _ in range(3))
         self.met = replace(self.met, cursor=met_cursor)
         for contacts in self.lists.values():

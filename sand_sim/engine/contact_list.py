@@ -9,6 +9,7 @@ from functools import cache
 import warp as wp
 
 from sand_sim.contact.response import memory_type
+from sand_sim.engine.borrowing import Lender
 from sand_sim.engine.count import Count, count_of, share_out
 from sand_sim.engine.flags import FAULT_ROOM, Flags
 from sand_sim.engine.kernel import kernel, sure
@@ -24,9 +25,11 @@ class ContactList:
         starts: contacts of grain i are ``starts[i]`` to ``starts[i + 1]``, int, shape (grains + 1,).
         owner: the grain, int, shape (room,).
         partner: the other grain, the wall or the tool particle, int, shape (room,).
-        force: on the owner, vec3, shape (room,) [N].
-        couple: tangential torque per lever arm (vec3 [N]) and half the overlap [m], vec4, shape (room,); None without rotation.
-        moment: rolling and twisting resistance on the owner, vec3, shape (room,) [N m]; None without.
+        force: on the owner, and nothing last, because four numbers are read at once, vec4, shape (room + 1,) [N].
+        couple: tangential torque per lever arm (vec3 [N]) and half the overlap [m], vec4, shape (room + 1,); None without
+            rotation.
+        moment: rolling and twisting resistance on the owner, and nothing last, vec4, shape (room + 1,) [N m]; None without.
+            Behind the last of each of the three lies a contact that is always zero.
         memory: what the contact laws remember, shape (room,); None without history.
         drawer: memory of the last list while a new one is made; None without history.
         wanted: contacts found by the last search, int, shape (1,).
@@ -46,19 +49,19 @@ class ContactList:
     def make_room(self, room: int) -> None:
         """Enlarge the list; its contents stay."""
         recipe = self.recipe
-        vec3, vec4, memory = recipe.precision.vec3, recipe.precision.vec4, memory_type(recipe.contact, recipe.precision)
+        vec4, memory = recipe.precision.vec4, memory_type(recipe.contact, recipe.precision)
         self.pairs.capacity, kept = room, self.memory
         self.owner = wp.zeros(room, dtype=int, device=self.device)
         self.partner = self._enlarged(self.partner, int)
         self.old_partner = wp.zeros(room, dtype=int, device=self.device)
-        self.force = wp.zeros(room, dtype=vec3, device=self.device)
-        self.couple = wp.zeros(room, dtype=vec4, device=self.device) if recipe.rotation else None
-        self.moment = wp.zeros(room, dtype=vec3, device=self.device) if recipe.contact.couples else None
+        self.force = wp.zeros(room + 1, dtype=vec4, device=self.device)
+        self.couple = wp.zeros(room + 1, dtype=vec4, device=self.device) if recipe.rotation else None
+        self.moment = wp.zeros(room + 1, dtype=vec4, device=self.device) if recipe.contact.couples else None
         self.memory = self.drawer = None
         if recipe.history:
             self.memory = self._enlarged(kept, memory)
-            # The force array is idle while lists are made.
-            self.drawer = self.force if memory is vec3 else wp.zeros(room, dtype=memory, device=self.device)
+            # Forces are idle while lists are made.
+            self.drawer = Lender(self.force[:room], self.device).lend(memory, room)
 
     def _enlarged(self, old: wp.array | None, dtype: type) -> wp.array:
         new = wp.zeros(self.pairs.capacity, dtype=dtype, device=self.device)

@@ -38,9 +38,9 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
         quantum: real,
         dt: real,
         memory: wp.array(dtype=memory_vector),
-        force: wp.array(dtype=vec3),
+        force: wp.array(dtype=vec4),
         couple: wp.array(dtype=vec4),
-        moment: wp.array(dtype=vec3),
+        moment: wp.array(dtype=vec4),
         deepest: wp.array(dtype=real),
         energy: wp.array(dtype=real),
     ):

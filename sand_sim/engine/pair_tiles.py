@@ -16,6 +16,7 @@ import warp as wp
 from sand_sim.contact.response import build_response, memory_type
 from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.pair_contact import build_excess, build_pair_contact
+from sand_sim.engine.prefetch import build_fetch_grain
 from sand_sim.engine.recipe import Recipe
 
 _TILE = 64  # contacts; their columns take 10 of the 32 or more KiB of the nearest cache
@@ -34,6 +35,7 @@ def build_pair_tiles(recipe: Recipe) -> wp.Kernel:
         build_pair_contact(recipe),
         build_response(recipe.contact, precision),
     )
+    fetch_grain = build_fetch_grain(recipe)
     whole_column, whole_columns = wp.types.vector(_TILE, precision.whole), wp.types.matrix((3, _TILE), precision.whole)
     column, columns3, columns4 = (
         wp.types.vector(_TILE, real),
@@ -60,9 +62,9 @@ def build_pair_tiles(recipe: Recipe) -> wp.Kernel:
         quantum: real,
         dt: real,
         memory: wp.array(dtype=memory_vector),
-        force: wp.array(dtype=vec3),
+        force: wp.array(dtype=vec4),
         couple: wp.array(dtype=vec4),
-        moment: wp.array(dtype=vec3),
+        moment: wp.array(dtype=vec4),
         deepest: wp.array(dtype=real),
         energy: wp.array(dtype=real),
     ):
@@ -97,6 +99,14 @@ def build_pair_tiles(recipe: Recipe) -> wp.Kernel:
                 contact = sure(first + item)
                 a = sure(owner[contact])
                 b = sure(partner[contact])
+                fetch_grain(
+                    sure(partner[sure(wp.min(contact + wp.static(2 * _TILE), end - 1))]),
+                    place,
+                    motion,
+                    spin,
+                    half_motion,
+                    half_spin,
+                )
                 at_a = place[a]
                 at_b = place[b]
                 of_a = motion[a]
@@ -191,11 +201,11 @@ def build_pair_tiles(recipe: Recipe) -> wp.Kernel:
             for item in range(number):
                 k = sure(item)
                 contact = sure(first + item)
-                force[contact] = vec3(forces[0, k], forces[1, k], forces[2, k])
+                force[contact] = vec4(forces[0, k], forces[1, k], forces[2, k], real(0.0))
                 if wp.static(rotation):
                     couple[contact] = vec4(turns[0, k], turns[1, k], turns[2, k], turns[3, k])
                 if wp.static(couples):
-                    moment[contact] = vec3(moments[0, k], moments[1, k], moments[2, k])
+                    moment[contact] = vec4(moments[0, k], moments[1, k], moments[2, k], real(0.0))
                 if wp.static(history):
                     after = memory_vector()
                     for i in range(wp.static(remembered)):

@@ -66,7 +66,7 @@ class Plungers:
 @cache
 def build_plunger_blocks(recipe: Recipe) -> wp.Kernel:
     """Kernel that sums the force of the grains on each plunger over blocks of contacts, shape (blocks * plungers,) [N]."""
-    vec3, surface_of = recipe.precision.vec3, build_surface_of(recipe)
+    vec4, surface_of = recipe.precision.vec4, build_surface_of(recipe)
 
     @kernel
     def plunger_blocks(
@@ -74,7 +74,7 @@ def build_plunger_blocks(recipe: Recipe) -> wp.Kernel:
         shares: int,
         pair_spans: wp.array(dtype=int),
         partner: wp.array(dtype=int),
-        force: wp.array(dtype=vec3),
+        force: wp.array(dtype=vec4),
         walls: wp.array(dtype=Surface),
         plungers: int,
         blocks: wp.array(dtype=wp.float64),

@@ -7,12 +7,15 @@ import warp as wp
 from sand_sim.contact.response import build_drifting, build_meeting, memory_type
 from sand_sim.engine.act import build_act, build_acts
 from sand_sim.engine.contact_list import build_note
-from sand_sim.engine.kernel import kernel
+from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.plungers import PlungerState
+from sand_sim.engine.prefetch import build_fetch_grain
 from sand_sim.engine.recipe import PLUNGER, ROUGH, SHELL, Recipe
 from sand_sim.engine.roughness import build_columns_near, build_rows_near, build_sphere_at
 from sand_sim.engine.surfaces import KINDS, Surface, build_nearest, build_surface_of
 from sand_sim.precision import Precision
+
+_AHEAD = 16  # contacts; the grains at a wall lie far from each other in memory
 
 
 @cache
@@ -135,7 +138,7 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     surface_of, (_, _, sphere_at) = build_surface_of(recipe), build_sphere_at()
     meeting, acts = build_meeting(precision), build_acts(recipe)
     drifting, halves = build_drifting(precision), recipe.halves
-    act, release = build_act(recipe, measuring)
+    act, release, fetch_grain = *build_act(recipe, measuring), build_fetch_grain(recipe)
     rough, moving = ROUGH in surfaces, PLUNGER in surfaces
 
     @kernel
@@ -158,13 +161,17 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
         walls: wp.array(dtype=Surface),
         plungers: wp.array(dtype=PlungerState),
         memory: wp.array(dtype=memory_vector),
-        force: wp.array(dtype=vec3),
+        force: wp.array(dtype=vec4),
         couple: wp.array(dtype=vec4),
-        moment: wp.array(dtype=vec3),
+        moment: wp.array(dtype=vec4),
         deepest: wp.array(dtype=real),
         energy: wp.array(dtype=real),
     ):
-        for contact in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+        end = spans[lane + 1]
+        for contact in range(spans[lane] + wp.tid(), end, stride):
+            fetch_grain(
+                sure(owner[sure(wp.min(contact + wp.static(_AHEAD), end - 1))]), place, motion, spin, half_motion, half_spin
+            )
             i = owner[contact]
             here = place[i]
             wall = walls[surface_of(walls, partner[contact])]

@@ -177,9 +177,9 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
         touch: wp.array(dtype=vec4),
         lever: wp.array(dtype=vec3),
         memory: wp.array(dtype=memory_vector),
-        force: wp.array(dtype=vec3),
+        force: wp.array(dtype=vec4),
         couple: wp.array(dtype=vec4),
-        moment: wp.array(dtype=vec3),
+        moment: wp.array(dtype=vec4),
         deepest: wp.array(dtype=real),
         energy: wp.array(dtype=real),
     ):
@@ -258,7 +258,7 @@ def build_wrench_blocks(recipe: Recipe) -> wp.Kernel:
 
     ``blocks`` has shape (blocks * tools, 2): force [N] and torque [N m] about the tool frame's origin, world frame.
     """
-    vec3, couples = recipe.precision.vec3, recipe.contact.couples
+    vec3, vec4, couples = recipe.precision.vec3, recipe.precision.vec4, recipe.contact.couples
 
     @kernel
     def wrench_blocks(
@@ -267,8 +267,8 @@ def build_wrench_blocks(recipe: Recipe) -> wp.Kernel:
         pair_spans: wp.array(dtype=int),
         partner: wp.array(dtype=int),
         tool_of: wp.array(dtype=int),
-        force: wp.array(dtype=vec3),
-        moment: wp.array(dtype=vec3),
+        force: wp.array(dtype=vec4),
+        moment: wp.array(dtype=vec4),
         lever: wp.array(dtype=vec3),
         tools: int,
         blocks: wp.array2d(dtype=wp.vec3d),
@@ -282,10 +282,12 @@ def build_wrench_blocks(recipe: Recipe) -> wp.Kernel:
                 blocks[block * tools + tool, 1] = wp.vec3d(wp.float64(0.0))
             first = block * wp.static(SUM_BLOCK)
             for contact in range(first, wp.min(first + wp.static(SUM_BLOCK), pairs)):
-                push = force[contact]
+                felt = force[contact]
+                push = vec3(felt[0], felt[1], felt[2])
                 torque = wp.cross(lever[contact], push)
                 if wp.static(couples):
-                    torque += moment[contact]
+                    resistance = moment[contact]
+                    torque += vec3(resistance[0], resistance[1], resistance[2])
                 row = block * tools + tool_of[partner[contact]]
                 blocks[row, 0] = blocks[row, 0] - wp.vec3d(wp.float64(push[0]), wp.float64(push[1]), wp.float64(push[2]))
                 blocks[row, 1] = blocks[row, 1] - wp.vec3d(wp.float64(torque[0]), wp.float64(torque[1]), wp.float64(torque[2]))

@@ -94,8 +94,7 @@ def test_many_at_once_give_what_one_gives(name):
 
     def results(build):
         remembered = wp.array(kept.astype(real), dtype=memory)
-        force, moment = wp.zeros(pairs, dtype=precision.vec3), wp.zeros(pairs, dtype=precision.vec3)
-        couple = wp.zeros(pairs, dtype=precision.vec4)
+        force, couple, moment = (wp.zeros(pairs, dtype=precision.vec4) for _ in range(3))
         deepest, energy = wp.zeros(1, dtype=precision.real), wp.zeros(1, dtype=precision.real)
         wp.launch(build(recipe), 1, [0, *given, remembered, force, couple, moment, deepest, energy], device="cpu")
         return [array.numpy() for array in (force, couple, moment, remembered, deepest)]
