@@ -5,11 +5,14 @@ from functools import cache
 import warp as wp
 
 from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_TOO_FAST
-from sand_sim.engine.free_rotation import rotate_freely, spin_of
-from sand_sim.engine.kernel import kernel
+from sand_sim.engine.free_rotation import ease_of, rotate_freely, spin_of
+from sand_sim.engine.kernel import kernel, sure
+from sand_sim.engine.prefetch import build_fetch_grain, build_prefetch
 from sand_sim.engine.recipe import Recipe
 from sand_sim.integrator import VERLET
 from sand_sim.precision import Precision
+
+_AHEAD = 3  # bodies; they keep their numbers, so that their spheres lie anywhere
 
 
 @kernel
@@ -39,7 +42,7 @@ def build_gather_body(precision: Precision) -> wp.Function:
         force = vec3(real(0.0))
         torque = vec3(real(0.0))
         for m in range(first, last):
-            i = sphere_at[m]
+            i = sure(sphere_at[sure(m)])
             here = place[i]
             arm = vec3(real(here[0] - at[0]), real(here[1] - at[1]), real(here[2] - at[2])) * quantum
             push = felt_force[i]
@@ -58,9 +61,11 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
     leaves the domain is retired with all its spheres.
     """
     precision, verlet = recipe.precision, recipe.integrator == VERLET
+    mat33 = wp.types.matrix((3, 3), precision.real)
     real, whole, vec3, vec4 = precision.real, precision.whole, precision.vec3, precision.vec4
     whole3, whole4 = precision.whole3, precision.whole4
-    gather_body = build_gather_body(precision)
+    gather_body, fetch_grain = build_gather_body(precision), build_fetch_grain(recipe)
+    fetch_felt, fetch_place = build_prefetch(vec3), build_prefetch(whole4)
 
     @kernel
     def move_bodies(
@@ -95,7 +100,17 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
         grains_moved: wp.array(dtype=int),
         fault: wp.array(dtype=int),
     ):
-        for b in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+        end = spans[lane + 1]
+        per_quantum = real(1.0) / quantum
+        for k in range(spans[lane] + wp.tid(), end, stride):
+            b = sure(k)
+            soon = sure(wp.min(k + wp.static(_AHEAD), end - 1))
+            for m in range(starts[soon], starts[soon + 1]):
+                i = sure(sphere_at[sure(m)])
+                fetch_grain(i, place, motion, spin, sphere_half_motion, sphere_half_spin)
+                fetch_felt(felt_force, i)
+                fetch_felt(felt_torque, i)
+                fetch_place(origin, i)
             at = body_place[b]
             if at[3] == whole(0):
                 continue
@@ -146,17 +161,19 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
             left = step - jump
             remainder[b] = left
             body_place[b] = whole4(x, y, z, at[3])
-            turned = rotate_freely(turn[b], turning, inertia[b], wp.float64(dt))
+            ease = ease_of(inertia[b])
+            turned = rotate_freely(turn[b], turning, ease, wp.float64(dt))
             turn[b] = turned
-            omega_d = spin_of(turned, turning_now, inertia[b])
+            axes = wp.quat_to_matrix(turned)
+            omega_d = spin_of(axes, turning_now, ease)
             omega = vec3(real(omega_d[0]), real(omega_d[1]), real(omega_d[2]))
-            past_d = spin_of(turned, turning, inertia[b])
+            past_d = spin_of(axes, turning, ease)
             past = vec3(real(past_d[0]), real(past_d[1]), real(past_d[2]))
-            rotation = wp.quaternion(real(turned[0]), real(turned[1]), real(turned[2]), real(turned[3]))
+            rotation = mat33(axes)
             for m in range(first, last):
-                i = sphere_at[m]
-                arm = wp.quat_rotate(rotation, offset[m])
-                spot = arm / quantum + left
+                i = sure(sphere_at[sure(m)])
+                arm = rotation * offset[sure(m)]
+                spot = arm * per_quantum + left
                 u = x + whole(wp.rint(spot[0]))
                 v = y + whole(wp.rint(spot[1]))
                 w = z + whole(wp.rint(spot[2]))
@@ -184,6 +201,7 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
 def build_see_bodies(recipe: Recipe) -> wp.Kernel:
     """Kernel that completes the step of all bodies with the forces of now for lookers, as ``motion.build_complete_step``."""
     precision, verlet = recipe.precision, recipe.integrator == VERLET
+    mat33 = wp.types.matrix((3, 3), precision.real)
     real, whole, vec3, vec4, whole4 = precision.real, precision.whole, precision.vec3, precision.vec4, precision.whole4
     gather_body = build_gather_body(precision)
 
@@ -213,7 +231,8 @@ def build_see_bodies(recipe: Recipe) -> wp.Kernel:
         seen_body_velocity: wp.array(dtype=wp.vec3d),
         seen_body_spin: wp.array(dtype=wp.vec3d),
     ):
-        for b in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+        for k in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
+            b = sure(k)
             at = body_place[b]
             if at[3] == whole(0):
                 continue
@@ -227,16 +246,16 @@ def build_see_bodies(recipe: Recipe) -> wp.Kernel:
                 velocity = half_motion[b] + (force / of_b[3] + gravity) * (real(0.5) * dt)
                 push = wp.vec3d(wp.float64(torque[0]), wp.float64(torque[1]), wp.float64(torque[2]))
                 turning += push * (wp.float64(0.5) * wp.float64(dt))
-            omega = spin_of(turn[b], turning, inertia[b])
+            axes = wp.quat_to_matrix(turn[b])
+            omega = spin_of(axes, turning, ease_of(inertia[b]))
             seen_body_velocity[b] = wp.vec3d(wp.float64(velocity[0]), wp.float64(velocity[1]), wp.float64(velocity[2]))
             seen_body_spin[b] = omega
             if wp.static(verlet):
                 spinning = vec3(real(omega[0]), real(omega[1]), real(omega[2]))
-                turned = turn[b]
-                rotation = wp.quaternion(real(turned[0]), real(turned[1]), real(turned[2]), real(turned[3]))
+                rotation = mat33(axes)
                 for m in range(first, last):
-                    i = sphere_at[m]
-                    carried = velocity + wp.cross(spinning, wp.quat_rotate(rotation, offset[m]))
+                    i = sure(sphere_at[sure(m)])
+                    carried = velocity + wp.cross(spinning, rotation * offset[sure(m)])
                     seen_motion[i] = vec4(carried[0], carried[1], carried[2], real(0.0))
                     seen_spin[i] = spinning
 

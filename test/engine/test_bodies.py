@@ -193,7 +193,7 @@ def clump_bed(tmp_path, **further):
 
 
 def test_clumps_and_spheres_come_to_rest_together(tmp_path):
-    world = clump_bed(tmp_path, settle={"time": 1.5, "speed": 1e-3})
+    world = clump_bed(tmp_path, settle={"time": 2.0, "speed": 1e-4})
     observation = world.observe()
     grains = observation.grains
     weight = grains.mass.astype(float).sum() * 9.81
