@@ -36,12 +36,14 @@ class StampRules:
         furthest: how far it may lie ahead [s].
         gap: commands farther apart than this belong to two streams [s].
         hold: how long a velocity lasts unless the next one comes [s].
+        relative: whether stamps are of another clock; the first one means one gap from now, the others are counted from it.
     """
 
     oldest: float = 0.5
     furthest: float = 60.0
     gap: float = 0.2
     hold: float = 0.2
+    relative: bool = False
 
 
 USUAL = StampRules()
@@ -76,6 +78,7 @@ class Courses:
 
     Attributes:
         limited: number of commands that were slowed to keep to ``max_speed``.
+        shift: from the clock of relative stamps to simulated time [s]; None before the first of them.
     """
 
     def __init__(self, world: World, lockstep: bool, rules: StampRules):
@@ -86,6 +89,7 @@ class Courses:
     def clear(self) -> None:
         """Forget all commands, after which time may begin anew."""
         self.by_tool = {tool.name: Course() for tool in self._world.scene.tools}
+        self.shift: float | None = None
 
     @property
     def promised(self) -> float:
@@ -133,12 +137,18 @@ class Courses:
         return True
 
     def _checked(self, command: Command, reject: Callable[[CommandError], None]) -> Command | None:
+        shift = self.shift
         try:
             command = self._world.check(command)
+            if self.rules.relative and command.time is not None:
+                if shift is None:
+                    shift = self._world.time + self.rules.gap - command.time
+                command = replace(command, time=command.time + shift)
             self._check_stamp(command, self.by_tool[command.tool])
         except CommandError as error:
             reject(error)
             return None
+        self.shift = shift
         if command.time is not None:
             self.by_tool[command.tool].last_stamp = command.time
         return command
@@ -149,7 +159,7 @@ class Courses:
             if self.lockstep:
                 raise CommandError(
                     "no_stamp",
-                    f"{tool}: in lockstep a command needs a stamp in simulated time, this one has none (or stamps:=ignored)",
+                    f"{tool}: in lockstep a command needs a stamp, this one has none (or stamps:=ignored is set)",
                 )
             return
         stamp = f"{tool}: stamp {command.time:.6f} s"
@@ -157,8 +167,8 @@ class Courses:
             raise CommandError(
                 "future",
                 f"{stamp} is more than {rules.furthest:g} s ahead of simulated time {now:.6f} s; stamps are simulated "
-                "time (use_sim_time and /clock), or zero for as soon as possible; with the node's parameter stamps:=ignored "
-                "any are taken for zero",
+                "time (use_sim_time and /clock), or zero for as soon as possible; with the node's parameter stamps:=relative "
+                "they are counted from the first one, with stamps:=ignored any are taken for zero",
             )
         if command.time <= course.last_stamp:
             raise CommandError(

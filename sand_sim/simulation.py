@@ -311,7 +311,7 @@ class Simulation:
         """Go on with the commands and the history of a checkpoint whose state the world has."""
         courses, rejected, limited, frame_end = unpack_told(checkpoint.commands, self.world)
         self._unpack_history(checkpoint.history)
-        self.courses.by_tool, self.courses.limited = courses, limited
+        self.courses.by_tool, self.courses.limited, self.courses.shift = courses, limited, None
         self.rejected, self._frame_end = rejected, frame_end
         self.fault, self._due = None, (0.0, 0.0)
 

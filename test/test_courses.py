@@ -168,3 +168,24 @@ def test_velocities_in_lockstep_last_until_their_stamps(tmp_path):
     assert driven.tool.position == pytest.approx(START + [0.01, 0.0, 0.02], abs=2e-5)
     driven.take(velocity((0.1, 0.0, 0.0)), velocity((0.1, 0.0, 0.0), at=0.3))
     assert driven.rejected == {"no_stamp": 1, "out_of_order": 1}
+
+
+def test_stamps_of_another_clock_are_counted_from_the_first(tmp_path):
+    driven, clock = Driven(tmp_path, relative=True, gap=0.1), 1.8e9
+    driven.go_to(0.5)
+    driven.take(pose(0.0, np.nan), pose(0.001, clock), pose(0.003, clock + 0.05))  # a bad one does not set the clock
+    for time, height in ((0.6, 0.001), (0.625, 0.002), (0.65, 0.003)):
+        driven.go_to(time)
+        assert driven.tool.position == pytest.approx(START + [0.0, 0.0, height], abs=1e-6)
+    driven.take(pose(0.003, clock + 0.02), pose(0.003, clock + 100.0))
+    assert driven.rejected == {"not_finite": 1, "out_of_order": 1, "future": 1}
+    assert "stamps:=relative" in driven.messages[-1]
+
+
+def test_a_clock_is_forgotten_with_the_commands(tmp_path):
+    driven = Driven(tmp_path, lockstep=True, relative=True, gap=0.1)
+    for clock in (5.0e8, 20.0):
+        driven.take(pose(0.001, clock))
+        assert driven.courses.promised == pytest.approx(driven.world.time + 0.1, abs=1e-6)
+        driven.courses.clear()
+    assert driven.rejected == {}

@@ -153,7 +153,8 @@ class SandSimNode(LifecycleNode):
 
     def _rules(self) -> StampRules:
         names = {"oldest": "stamp_oldest", "furthest": "stamp_furthest", "gap": "stream_gap", "hold": "velocity_hold"}
-        return StampRules(**{field: self.parameters[name] for field, name in names.items()})
+        numbers = {field: self.parameters[name] for field, name in names.items()}
+        return StampRules(**numbers, relative=self.parameters["stamps"] == "relative")
 
     def _configure(self) -> None:
         parameters = self.parameters

@@ -51,7 +51,7 @@ DECLARATIONS = (
     Declaration("robot_description_timeout", 10.0, "How long to wait for the topic when configuring [s].", 0.0, 1.0e6),
     Declaration("mesh_roots", [""], "Folders for meshes of robot descriptions; '' for the usual ones and all ROS packages."),
     Declaration("publish_clock", True, "Publish simulated time on /clock; false beside another source of it."),
-    Declaration("stamps", "simulated", "What stamps of commands mean.", choices=("simulated", "ignored")),
+    Declaration("stamps", "simulated", "What stamps of commands mean.", choices=("simulated", "relative", "ignored")),
     Declaration("stamp_oldest", 0.5, "How far a stamp may lie behind simulated time [s].", 0.0, 1.0e9, changeable=True),
     Declaration("stamp_furthest", 60.0, "How far a stamp may lie ahead of simulated time [s].", 0.0, 1.0e9, changeable=True),
     Declaration("stream_gap", 0.2, "Commands farther apart than this are two streams [s].", 1.0e-3, 1.0e9, changeable=True),

@@ -32,23 +32,26 @@ def play(client: Client, bodies, period):
         client.executor.spin_once(timeout_sec=period)
 
 
+def felt_in_lockstep(client: Client, bodies, period, until):
+    """All wrenches up to a time, after which the node is reset."""
+    client.wrenches.clear()
+    play(client, bodies, period)
+    client.wait_for(lambda: client.wrenches and stamp_to_time(client.wrenches[-1].header.stamp) > until - 1e-6)
+    felt = {stamp_to_time(wrench.header.stamp): wrench_to_arrays(wrench) for wrench in client.wrenches}
+    assert client.call(Trigger, "reset").success
+    return np.array([felt[at] for at in sorted(felt) if at > 0.0])
+
+
 def test_the_same_wrenches_at_any_speed(client, start_node):
     node = start_node(pacing="lockstep")
     client.connect()
-    runs = []
-    for period in (0.0, 0.01):
-        client.wrenches.clear()
-        play(client, bag(0.0), period)
-        client.wait_for(lambda: client.wrenches and stamp_to_time(client.wrenches[-1].header.stamp) > TIMES[-1] - 1e-6)
-        felt = {stamp_to_time(wrench.header.stamp): wrench_to_arrays(wrench) for wrench in client.wrenches}
-        runs.append(np.array([felt[at] for at in sorted(felt) if at > 0.0]))
-        assert client.call(Trigger, "reset").success
+    runs = [felt_in_lockstep(client, bag(0.0), period, TIMES[-1]) for period in (0.0, 0.01)]
     assert np.array_equal(*runs)
     assert np.abs(runs[0]).max() > 1.0
     assert node.simulation.rejected == {}
 
 
-@pytest.mark.parametrize("stamps", ["simulated", "ignored"])
+@pytest.mark.parametrize("stamps", ["simulated", "relative", "ignored"])
 def test_stamps_of_years_ago(client, start_node, stamps):
     """They are refused with what to set, and taken if that is set."""
     node = start_node(stamps=stamps)
@@ -60,3 +63,15 @@ def test_stamps_of_years_ago(client, start_node, stamps):
     else:
         client.wait_for(lambda: client.wrenches and wrench_to_arrays(client.wrenches[-1])[0][2] > 1.0)
         assert node.simulation.rejected == {}
+
+
+def test_stamps_of_years_ago_in_lockstep(client, start_node):
+    """Counted from the first, they give the same wrenches to the bit, however fast they are played."""
+    node = start_node(pacing="lockstep", stamps="relative")
+    client.connect()
+    runs = [
+        felt_in_lockstep(client, bag(1.5e9), period, until=node.parameters["stream_gap"] + TIMES[-2]) for period in (0.0, 0.01)
+    ]
+    assert np.array_equal(*runs)
+    assert np.abs(runs[0]).max() > 1.0
+    assert node.simulation.rejected == {}
