@@ -2,14 +2,15 @@
 
 import numpy as np
 
-from sampler.crossing import crossed_pieces
+from sampler.crossing import crossing_planes, cut_triangles
 from sampler.surface import Surface
 
 _STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what is there
 _TRIAL = 4000  # random places that show whether anything is buried at all
-_DEEPEST = 20  # halvings of a triangle that is partly buried
-_ISLAND, _FINEST = 1.5, 0.15  # triangles larger than this may hold islands; smaller ones are not cut further; in spacings
-_MOST = 10  # partly buried triangles per particle to come, after which only large ones are cut
+_DEEPEST = 400  # cuts through one triangle
+_ISLAND = 1.5  # triangles longer than this are halved, others cut along the planes that cross them; in spacings
+_MOST, _FINEST = 10, 0.3  # cuts per particle to come, after which only triangles longer than so many spacings are cut
+
 
 
 class Skin(Surface):
@@ -33,7 +34,7 @@ class Skin(Surface):
 
 def free_triangles(
     triangles: np.ndarray, around: Surface, spacing: float, two_sided: bool = False
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Triangles, or parts of them, that have an outside before them and an inside behind them.
 
     Args:
@@ -43,47 +44,37 @@ def free_triangles(
         two_sided: the triangles are sheets, free where any of their sides is.
 
     Returns:
-        Shape (m, 3, 3) [m], and the given triangle that each is part of, shape (m,).
+        Shape (m, 3, 3) [m]; the given triangle that each is part of, shape (m,); how many lie on one another there, shape (m,).
     """
     parent = np.flatnonzero(Surface.areas_of(triangles) > 0.0)
     triangles = triangles[parent]
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
-    if _free(places, normals, around, two_sided).all():
-        return triangles, parent
-    coincide = np.any(coincidence(places, normals, around) > 1)
-    most = _MOST * float(Surface.areas_of(triangles).sum()) / spacing**2
-    pieces, parents, mixed = [], [], 0
-    for depth in range(_DEEPEST + 1):
+    if _ask(places, normals, around, two_sided)[0].all():
+        return triangles, parent, np.ones(len(parent), int)
+    most = len(triangles) + _MOST * float(Surface.areas_of(triangles).sum()) / spacing**2
+    pieces, parents, cuts = [], [], 0
+    for _ in range(_DEEPEST):
         edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
-        cut = (edge > (_FINEST if mixed < most else _ISLAND) * spacing) & (depth < _DEEPEST)
-        cut[cut] = crossed_pieces(triangles[cut], around, _STEP * around.unit)
-        small = np.flatnonzero(cut & (edge <= _ISLAND * spacing))
-        cut[small] = _is_mixed(triangles[small], around, coincide)
-        mixed += int(cut[small].sum())
-        pieces.append(triangles[~cut])
-        parents.append(parent[~cut])
-        triangles, parent = _halve(triangles[cut]), np.tile(parent[cut], 2)
+        worth = np.flatnonzero(edge > (0.0 if cuts < most else _FINEST * spacing))
+        crossed, normals, places = crossing_planes(triangles[worth], around, _STEP * around.unit)
+        crossed = worth[crossed]
+        sound = np.ones(len(triangles), bool)
+        sound[crossed] = False
+        cuts += len(crossed)
+        pieces.append(triangles[sound])
+        parents.append(parent[sound])
+        triangles, parent, edge = triangles[crossed], parent[crossed], edge[crossed]
         if not len(triangles):
             break
+        small = edge <= _ISLAND * spacing
+        parts, origin = cut_triangles(triangles[small], normals[small], places[small])
+        triangles = np.concatenate([_halve(triangles[~small]), parts])
+        parent = np.concatenate([np.tile(parent[~small], 2), parent[small][origin]])
+    pieces.append(triangles)
+    parents.append(parent)
     pieces, parents = np.concatenate(pieces), np.concatenate(parents)
-    free = _free(pieces.mean(axis=1), _normals(pieces), around, two_sided)
-    return pieces[free], parents[free]
-
-
-def _is_mixed(pieces: np.ndarray, around: Surface, coincide: bool) -> np.ndarray:
-    """Whether what lies before a piece at its rim differs from what lies before its middle; behind it, too, if asked for.
-
-    Where two surfaces that coincide part, pieces must end, so that each is covered as often all over.
-    """
-    centre, normal = pieces.mean(axis=1, keepdims=True), _normals(pieces)[:, None]
-    rim = np.concatenate([pieces, 0.5 * (pieces + np.roll(pieces, -1, axis=1))], axis=1)  # corners and midpoints
-    places = np.concatenate([centre, 0.98 * rim + 0.02 * centre], axis=1)
-    mixed = np.zeros(len(pieces), bool)
-    for side in (1.0, -1.0) if coincide else (1.0,):
-        number = np.abs(around.winding((places + side * _STEP * around.unit * normal).reshape(-1, 3))).reshape(-1, 7)
-        state = number < 0.5 if side > 0.0 else np.rint(number)
-        mixed |= np.any(state != state[:, :1], axis=1)
-    return mixed
+    free, layers = _ask(pieces.mean(axis=1), _normals(pieces), around, two_sided)
+    return pieces[free], parents[free], layers[free]
 
 
 def _normals(triangles: np.ndarray) -> np.ndarray:
@@ -91,19 +82,12 @@ def _normals(triangles: np.ndarray) -> np.ndarray:
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
 
 
-def coincidence(points: np.ndarray, normals: np.ndarray, around: Surface) -> np.ndarray:
-    """How many faces of closed surfaces lie on one another at places of theirs, at least 1, shape (n,) int."""
+def _ask(points: np.ndarray, normals: np.ndarray, around: Surface, two_sided: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Whether places of a surface are free, and how many faces of closed surfaces lie on one another there, at least 1."""
     step = _STEP * around.unit * normals
-    before, behind = (np.abs(around.winding(points + side * step)) for side in (1.0, -1.0))
-    return np.maximum(np.rint(behind - before), 1).astype(int)
-
-
-def _free(points: np.ndarray, normals: np.ndarray, around: Surface, two_sided: bool) -> np.ndarray:
-    """Whether places of a surface are free."""
-    step = _STEP * around.unit * normals
-    before = np.abs(around.winding(points + step)) < 0.5
-    behind = np.abs(around.winding(points - step)) < 0.5
-    return (before | behind) if two_sided else (before != behind)
+    before, behind = np.abs(around.winding(np.concatenate([points + step, points - step]))).reshape(2, -1)
+    free = ((before < 0.5) | (behind < 0.5)) if two_sided else ((before < 0.5) != (behind < 0.5))
+    return free, np.maximum(np.rint(behind - before), 1).astype(int)
 
 
 def _halve(triangles: np.ndarray) -> np.ndarray:
