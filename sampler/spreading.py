@@ -127,7 +127,7 @@ class _State:
         return self.points.numpy() * self.skin.unit + self.skin.centre
 
     def result(self) -> tuple[np.ndarray, np.ndarray]:
-        points, face = self.skin.closest(self.positions())
+        points, face = self.skin.closest(self.positions(), up=self.normals.numpy())
         return points, self.skin.normals[face]
 
     def gaps(self, places: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, float]:
@@ -152,7 +152,7 @@ class _State:
         All in spacings.
         """
         reach = 2.0 * self.unit_spacing
-        self.grid.build(self.points, reach)
+        self.grid.build(self.points, 0.5 * reach)
         free, own = (wp.empty(len(places), dtype=float, device=self.device) for _ in range(2))
         inputs = [self.grid.id, self.points, self.normals, self.skin.shift(places), self._vectors(normals), reach]
         launch_shares(find_gaps, len(places), inputs, [free, own], self.device)

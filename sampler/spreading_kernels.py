@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from sampler.surface import nearest_face
+from sampler.surface import ASIDE, nearest_face
 
 MODULE = "sampler_spreading"
 
@@ -84,7 +84,7 @@ def push_apart(
     step = push * strength
     step *= wp.min(1.0, _FARTHEST * spacing / wp.max(wp.length(step), 1.0e-12))
     there = here + step
-    face = nearest_face(mesh, there, 1.01 * wp.length(step) + 1.0e-3 * spacing)
+    face = nearest_face(mesh, there, 1.01 * wp.length(step) + 1.0e-3 * spacing, up, ASIDE)
     if face >= 0:
         moved[i] = closest_point(corners[3 * face], corners[3 * face + 1], corners[3 * face + 2], there)
         moved_normals[i] = face_normals[face]
@@ -167,9 +167,14 @@ def find_gaps(
     here = samples[i]
     best = reach
     own = reach
-    for j in wp.hash_grid_query(grid, here, reach):
+    near = 0.5 * reach
+    for j in wp.hash_grid_query(grid, here, near):
         best = wp.min(best, wp.length(points[j] - here))
         own = wp.min(own, way_along(here, sample_normals[i], points[j], normals[j]))
+    if own > near:  # next to never
+        for j in wp.hash_grid_query(grid, here, reach):
+            best = wp.min(best, wp.length(points[j] - here))
+            own = wp.min(own, way_along(here, sample_normals[i], points[j], normals[j]))
     distance[i] = best
     own_distance[i] = own
 
