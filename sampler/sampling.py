@@ -82,7 +82,7 @@ def sample_body(
         cut = np.any(owner != SHEET)
         if cut:
             solid = Surface(closed[owner != SHEET], device)
-            sheet = free_triangles(free, solid, fine, two_sided=True)[0]
+            sheet = free_triangles(free, solid, fine)[0]
             free = np.concatenate([free_triangles(solid.triangles, solid, fine)[0], sheet])
         free = free[Surface.areas_of(free) > 0.0]
     if not len(free):
@@ -130,7 +130,7 @@ def sample_body(
 
 
 def _clear_creases(points: np.ndarray, normals: np.ndarray, skin: Skin, solid: Surface, step: float) -> np.ndarray:
-    """Take particles that lie in the crease between two parts a small step [m] away from it, so that they look out of the solid."""
+    """Take particles in the crease between two parts a small step [m] away from it, so that they look out of the solid."""
     _, face = skin.closest(points)
     buried = np.abs(solid.winding(points + 2e-5 * solid.unit * normals)) > 0.5
     inward = skin.triangles[face].mean(axis=1) - points
@@ -163,7 +163,7 @@ def _mass(closed, free, parent, layers, around, warnings) -> tuple[float, np.nda
         volume, centre, inertia = integrate(closed)
     else:
         volume, centre, inertia = integrate(free, 1.0 / layers)
-        warnings.append("parts of the surface are buried in others; volume and inertia are those of the union, to about 0.1 %")
+        warnings.append("parts of the surface are buried in others; volume and inertia are those of the union")
     low, high = closed.min(axis=(0, 1)), closed.max(axis=(0, 1))
     if is_physical(volume, centre, inertia, low, high):
         return volume, centre, inertia

@@ -12,17 +12,27 @@ _ISLAND = 1.5  # triangles longer than this are halved, others cut along the pla
 _MOST, _FINEST = 10, 0.3  # cuts per particle to come, after which only triangles longer than so many spacings are cut
 
 
-
 class Skin(Surface):
     """Triangles with what random sampling and Warp kernels need."""
 
-    def sample(self, number: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    def places(self, number: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+        """Random places, so many over the area and as many over the longest edges, so that narrow strips get their share."""
+        length = np.linalg.norm(self.triangles - np.roll(self.triangles, -1, axis=1), axis=2).max(axis=1)
+        both = self.sample(number, random), self.sample(number, random, length)
+        return tuple(np.concatenate(pair) for pair in zip(*both, strict=True))
+
+    def sample(self, number: int, random: np.random.Generator, weight: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Random places, stratified over the area.
+
+        Args:
+            number: of places.
+            random: where chance comes from.
+            weight: of the triangles, instead of their areas.
 
         Returns:
             Points, shape (number, 3) [m], and the normals of their triangles, shape (number, 3).
         """
-        share = np.cumsum(self.areas)
+        share = np.cumsum(self.areas if weight is None else weight)
         at = (np.arange(number) + random.random(number)) / number * share[-1]
         face = np.minimum(np.searchsorted(share, at), len(share) - 1)
         u = random.random((number, 2))
@@ -32,16 +42,13 @@ class Skin(Surface):
         return points, self.normals[face]
 
 
-def free_triangles(
-    triangles: np.ndarray, around: Surface, spacing: float, two_sided: bool = False
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangles, or parts of them, that have an outside before them and an inside behind them.
+def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles, or parts of them, that have an outside on any side: walls as thin as paper, and sheets, have it on both.
 
     Args:
         triangles: shape (n, 3, 3) [m].
         around: all closed surfaces, these among them.
         spacing: of the particles to come [m].
-        two_sided: the triangles are sheets, free where any of their sides is.
 
     Returns:
         Shape (m, 3, 3) [m]; the given triangle that each is part of, shape (m,); how many lie on one another there, shape (m,).
@@ -49,7 +56,7 @@ def free_triangles(
     parent = np.flatnonzero(Surface.areas_of(triangles) > 0.0)
     triangles = triangles[parent]
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
-    if _ask(places, normals, around, two_sided)[0].all():
+    if _ask(places, normals, around)[0].all():
         return triangles, parent, np.ones(len(parent), int)
     most = len(triangles) + _MOST * float(Surface.areas_of(triangles).sum()) / spacing**2
     pieces, parents, cuts = [], [], 0
@@ -73,7 +80,7 @@ def free_triangles(
     pieces.append(triangles)
     parents.append(parent)
     pieces, parents = np.concatenate(pieces), np.concatenate(parents)
-    free, layers = _ask(pieces.mean(axis=1), _normals(pieces), around, two_sided)
+    free, layers = _ask(pieces.mean(axis=1), _normals(pieces), around)
     return pieces[free], parents[free], layers[free]
 
 
@@ -82,12 +89,11 @@ def _normals(triangles: np.ndarray) -> np.ndarray:
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
 
 
-def _ask(points: np.ndarray, normals: np.ndarray, around: Surface, two_sided: bool) -> tuple[np.ndarray, np.ndarray]:
+def _ask(points: np.ndarray, normals: np.ndarray, around: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Whether places of a surface are free, and how many faces of closed surfaces lie on one another there, at least 1."""
     step = _STEP * around.unit * normals
     before, behind = np.abs(around.winding(np.concatenate([points + step, points - step]))).reshape(2, -1)
-    free = ((before < 0.5) | (behind < 0.5)) if two_sided else ((before < 0.5) != (behind < 0.5))
-    return free, np.maximum(np.rint(behind - before), 1).astype(int)
+    return (before < 0.5) | (behind < 0.5), np.maximum(np.rint(behind - before), 1).astype(int)
 
 
 def _halve(triangles: np.ndarray) -> np.ndarray:

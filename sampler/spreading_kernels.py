@@ -9,6 +9,7 @@ MODULE = "sampler_spreading"
 _SAME = wp.constant(-0.2)  # cosine between normals from which two places lie on one skin
 _OTHER = wp.constant(-0.7)  # and below which they lie on different skins
 _ACROSS = wp.constant(0.8)  # range of the repulsion between skins, of that on one skin
+_CORE, _HARD = wp.constant(8.0), wp.constant(0.6)  # strength and range, in spacings, of what keeps particles apart in any case
 _FARTHEST = wp.constant(0.3)  # of a step, in spacings
 
 
@@ -78,6 +79,7 @@ def push_apart(
                 same = same_skin(up, normals[j])
                 # The two skins of a thin wall only keep their particles from lying on top of one another.
                 weight = repulsion(distance, spacing * (_ACROSS + (1.0 - _ACROSS) * same))
+                weight += _CORE * wp.max(_HARD - distance / spacing, 0.0)
                 crowd += same * weight
                 push += away * (weight / wp.max(distance, 1.0e-3 * spacing))
     crowding[i] = crowd
