@@ -91,6 +91,57 @@ def find_crossing(mesh: wp.uint64, corners: wp.array(dtype=wp.vec3), near: float
     found[i] = best
 
 
+@wp.kernel(enable_backward=False, module="sampler_crossing")
+def find_layers(
+    mesh: wp.uint64,
+    places: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    near: float,
+    first: int,
+    layers: wp.array(dtype=int),
+):
+    """How many triangles of the mesh a place lies on that face as its normal does, less those that face the other way."""
+    i = first + wp.tid()
+    x = places[i]
+    margin = wp.vec3(near)
+    points = wp.mesh_get(mesh).points
+    number = int(0)
+    for face in wp.mesh_query_aabb(mesh, x - margin, x + margin):
+        p = points[3 * face]
+        q = points[3 * face + 1]
+        r = points[3 * face + 2]
+        normal = wp.normalize(wp.cross(q - p, r - p))
+        facing = wp.dot(normal, normals[i])
+        if (
+            wp.abs(facing) > _PARALLEL
+            and wp.abs(wp.dot(x - p, normal)) <= near
+            and wp.dot(wp.cross(normal, q - p), x - p) >= 0.0
+            and wp.dot(wp.cross(normal, r - q), x - q) >= 0.0
+            and wp.dot(wp.cross(normal, p - r), x - r) >= 0.0
+        ):
+            number += int(wp.sign(facing))
+    layers[i] = number
+
+
+def count_layers(points: np.ndarray, normals: np.ndarray, around: Surface, near: float) -> np.ndarray:
+    """By how much the winding number of a surface falls where one goes through it along normals.
+
+    Args:
+        points: shape (n, 3) [m].
+        normals: shape (n, 3).
+        around: the surface.
+        near: how near to a point a triangle must come to count [m].
+
+    Returns:
+        Shape (n,) int.
+    """
+    layers = wp.empty(len(points), dtype=int, device=around.device)
+    up = wp.array(normals.astype(np.float32), dtype=wp.vec3, device=around.device)
+    inputs = [around.mesh.id, around.shift(points), up, near / around.unit]
+    launch_shares(find_layers, len(points), inputs, [layers], around.device)
+    return layers.numpy()
+
+
 def crossing_planes(pieces: np.ndarray, around: Surface, near: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Planes along which what lies before or behind pieces of a surface changes, one for each piece that there is any for.
 

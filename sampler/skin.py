@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from sampler.crossing import crossing_planes, cut_triangles
+from sampler.crossing import count_layers, crossing_planes, cut_triangles
 from sampler.surface import Surface
 
 _STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what is there
 _TRIAL = 4000  # random places that show whether anything is buried at all
 _DEEPEST = 400  # cuts through one triangle
 _ISLAND = 1.5  # triangles longer than this are halved, others cut along the planes that cross them; in spacings
-_MOST, _FINEST = 10, 0.3  # cuts per particle to come, after which only triangles longer than so many spacings are cut
+_MOST, _FINEST = 10, 0.5  # cuts per particle to come, after which only triangles longer than so many spacings are cut
 
 
 class Skin(Surface):
@@ -58,7 +58,7 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
     if _ask(places, normals, around)[0].all():
         return triangles, parent, np.ones(len(parent), int)
-    most = len(triangles) + _MOST * float(Surface.areas_of(triangles).sum()) / spacing**2
+    most = len(triangles) // 2 + _MOST * float(Surface.areas_of(triangles).sum()) / spacing**2
     pieces, parents, cuts = [], [], 0
     for _ in range(_DEEPEST):
         edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
@@ -91,9 +91,9 @@ def _normals(triangles: np.ndarray) -> np.ndarray:
 
 def _ask(points: np.ndarray, normals: np.ndarray, around: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Whether places of a surface are free, and how many faces of closed surfaces lie on one another there, at least 1."""
-    step = _STEP * around.unit * normals
-    before, behind = np.abs(around.winding(np.concatenate([points + step, points - step]))).reshape(2, -1)
-    return (before < 0.5) | (behind < 0.5), np.maximum(np.rint(behind - before), 1).astype(int)
+    step = _STEP * around.unit
+    before, layers = around.winding(points + step * normals), count_layers(points, normals, around, step)
+    return (np.abs(before) < 0.5) | (np.abs(before + layers) < 0.5), np.maximum(layers, 1)
 
 
 def _halve(triangles: np.ndarray) -> np.ndarray:
