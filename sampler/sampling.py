@@ -1,6 +1,7 @@
 """From a mesh to a particle body: repair, skin, particles, mass."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import trimesh
@@ -22,7 +23,7 @@ _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest 
 _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
 _WALL_SAMPLES = 4000
-_ASIDE = 0.01  # of a spacing: way from the crease between two parts
+_ASIDE = (0.01, 0.03, 0.09)  # ways from the crease between two parts that are tried, in spacings
 
 Progress = Callable[[float], None]
 
@@ -96,9 +97,9 @@ def sample_body(
                 f"a surface of {area:.3g} m^2 would need {number:.2g} particles of radius {radius:.3g} m; "
                 "check the mesh's scale, or take larger particles"
             )
-        points, normals = spread_particles(skin, number, seed, progress, observe)
-        if cut:
-            points = _clear_creases(points, normals, skin, solid, _ASIDE * lattice_spacing(area, number))
+        h = lattice_spacing(area, number)
+        settle = partial(_clear_creases, skin=skin, solid=solid, spacing=h) if cut else lambda *placed: placed
+        points, normals = spread_particles(skin, number, seed, progress, observe, settle)
         evenness = measure_evenness(skin, points, normals)
         h = lattice_spacing(area, len(points))
         if grain is None or evenness.coverage * h < radius + grain:
@@ -129,13 +130,25 @@ def sample_body(
     )
 
 
-def _clear_creases(points: np.ndarray, normals: np.ndarray, skin: Skin, solid: Surface, step: float) -> np.ndarray:
-    """Take particles in the crease between two parts a small step [m] away from it, so that they look out of the solid."""
-    _, face = skin.closest(points)
-    buried = np.abs(solid.winding(points + 2e-5 * solid.unit * normals)) > 0.5
-    inward = skin.triangles[face].mean(axis=1) - points
-    share = np.minimum(step / np.maximum(np.linalg.norm(inward, axis=1), np.finfo(float).tiny), 1.0)
-    return points + (buried * share)[:, None] * inward
+def _clear_creases(
+    points: np.ndarray, normals: np.ndarray, skin: Skin, solid: Surface, spacing: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Take particles in the crease between two parts a little away from it, so that they look out of the solid."""
+    _, face = skin.closest(points, up=normals)
+    corner = skin.triangles[face]
+    inward = np.cross(skin.normals[face][:, None], np.roll(corner, -1, axis=1) - corner)
+    inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), np.finfo(float).tiny)
+    depth = np.einsum("nij,nij->ni", points[:, None] - corner, inward)  # below each edge of the piece
+    away = inward[np.arange(len(points)), depth.argmin(axis=1)]
+    begin = points
+    points, normals = points.copy(), normals.copy()
+    for share in _ASIDE:
+        buried = np.flatnonzero(np.abs(solid.winding(points + 2e-5 * solid.unit * normals)) > 0.5)
+        if not len(buried):
+            break
+        points[buried], face = skin.closest(begin[buried] + share * spacing * away[buried], up=normals[buried])
+        normals[buried] = skin.normals[face]
+    return points, normals
 
 
 def thinnest_wall(surface: Surface) -> float:

@@ -93,7 +93,10 @@ def _ask(points: np.ndarray, normals: np.ndarray, around: Surface) -> tuple[np.n
     """Whether places of a surface are free, and how many faces of closed surfaces lie on one another there, at least 1."""
     step = _STEP * around.unit
     before, layers = around.winding(points + step * normals), count_layers(points, normals, around, step)
-    return (np.abs(before) < 0.5) | (np.abs(before + layers) < 0.5), np.maximum(layers, 1)
+    free = np.abs(before) < 0.5
+    turned = np.flatnonzero(~free & (np.abs(before + layers) < 0.5))  # faces inward, it seems; thin slits may feign that
+    free[turned] = np.abs(around.winding(points[turned] - step * normals[turned])) < 0.5
+    return free, np.maximum(layers, 1)
 
 
 def _halve(triangles: np.ndarray) -> np.ndarray:

@@ -25,9 +25,10 @@ _LONELY = 1.09  # and those farther than this from all others get a neighbour
 _AROUND = 4.0  # distance from a filled gap or a removed particle within which others move, in spacings
 _MEASURED = 100  # places per particle at which the result is measured
 _SPARE = 0.005  # share of the particles kept back for gaps, and share that may be added above the wanted number
-_PATIENCE = 4  # refills without improvement after which the best is taken
+_PATIENCE = 6  # refills without improvement after which the best is taken
 
 Observer = Callable[[np.ndarray], None]
+Settler = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 Places = tuple[np.ndarray, np.ndarray]  # on the surface, shape (n, 3) [m], and the normals there, shape (n, 3)
 
 
@@ -47,6 +48,7 @@ def spread_particles(
     seed: int = 0,
     progress: Callable[[float], None] = lambda share: None,
     observe: Observer | None = None,
+    settle: Settler = lambda points, normals: (points, normals),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Spread particles over a surface.
 
@@ -56,6 +58,7 @@ def spread_particles(
         seed: of the random start.
         progress: called with the share of the work done, 0 to 1.
         observe: called with the particles, shape (n, 3) [m], as they relax.
+        settle: moves particles a little, given their centres and normals, before they are judged.
 
     Returns:
         Particle centres on the surface, shape (number, 3) [m], and the normals of the triangles they lie on, shape (number, 3).
@@ -73,10 +76,12 @@ def spread_particles(
     places = skin.places(_SAMPLED * number, random)
     best, least, stuck = None, np.inf, 0
     for turn in range(_REFILLS + 1):
+        found = settle(*state.result())  # on an edge either face may be the nearest; judge by the final choice
+        state.points, state.normals = skin.shift(found[0]), state.vectors(found[1])
         places, gaps, crowded, fault = state.faults(places, random)
         stuck = 0 if fault < least else stuck + 1
         if fault < least:
-            best, least = state.result(), fault
+            best, least = found, fault
         if fault == 0.0 or turn == _REFILLS or stuck == _PATIENCE:
             break
         state.refill(places[0][gaps], places[1][gaps], crowded, pin=turn > 0)
@@ -106,14 +111,14 @@ class _State:
         self.unit_spacing = self.spacing / skin.unit
         self.grid = wp.HashGrid(128, 128, 128, device=self.device)
         self.corners = skin.shift(skin.triangles.reshape(-1, 3))
-        self.face_normals = self._vectors(skin.normals)
+        self.face_normals = self.vectors(skin.normals)
         self.most = number + int(_SPARE * number)
 
-    def _vectors(self, values: np.ndarray) -> wp.array:
+    def vectors(self, values: np.ndarray) -> wp.array:
         return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
 
     def place(self, points: np.ndarray, normals: np.ndarray, held: np.ndarray) -> None:
-        self.points, self.normals = self.skin.shift(points), self._vectors(normals)
+        self.points, self.normals = self.skin.shift(points), self.vectors(normals)
         self.held = wp.array(held.astype(np.int32), dtype=int, device=self.device)
         self.moved, self.moved_normals = wp.empty_like(self.points), wp.empty_like(self.normals)
         self.crowd = wp.zeros(len(points), dtype=float, device=self.device)
@@ -143,7 +148,6 @@ class _State:
             More places, where it was in doubt; which of them to fill, the worst first and none near a worse one; particles too
             near to others; the sum of all faults.
         """
-        self.normals = self._vectors(self.result()[1])  # on an edge either face may be the nearest; judge by the final choice
         nearest, found = self.nearest(), self.distances(*places)
         for _ in range(2):
             closer = self._beside(places, np.flatnonzero(_excess(*found) > -_DOUBT)[: len(self.points)], random)
@@ -179,7 +183,7 @@ class _State:
         reach = 2.0 * self.unit_spacing
         self.grid.build(self.points, 0.5 * reach)
         found = tuple(wp.empty(len(places), dtype=float, device=self.device) for _ in range(2))
-        inputs = [self.grid.id, self.points, self.normals, self.skin.shift(places), self._vectors(normals), reach]
+        inputs = [self.grid.id, self.points, self.normals, self.skin.shift(places), self.vectors(normals), reach]
         launch_shares(find_gaps, len(places), inputs, list(found), self.device)
         return tuple(values.numpy() / self.unit_spacing for values in found)
 
