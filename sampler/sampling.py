@@ -141,13 +141,14 @@ def _clear_creases(
     depth = np.einsum("nij,nij->ni", points[:, None] - corner, inward)  # below each edge of the piece
     away = inward[np.arange(len(points)), depth.argmin(axis=1)]
     begin = points
-    points, normals = points.copy(), normals.copy()
+    points = points.copy()
     for share in _ASIDE:
         buried = np.flatnonzero(np.abs(solid.winding(points + 2e-5 * solid.unit * normals)) > 0.5)
         if not len(buried):
             break
-        points[buried], face = skin.closest(begin[buried] + share * spacing * away[buried], up=normals[buried])
-        normals[buried] = skin.normals[face]
+        aside, face = skin.closest(begin[buried] + share * spacing * away[buried], up=normals[buried])
+        same = np.einsum("ij,ij->i", skin.normals[face], normals[buried]) > 0.9  # not over to the other part
+        points[buried[same]] = aside[same]
     return points, normals
 
 
