@@ -81,7 +81,7 @@ def judge(mesh, method, count):
     sheet, solid = (repaired.triangles[(repaired.kind == SHEET) == flat] for flat in (True, False))
     if len(solid):
         around = Surface(solid)
-        sheet = free_triangles(sheet, around, h, two_sided=True)[0] if len(sheet) else sheet
+        sheet = free_triangles(sheet, around, h)[0] if len(sheet) else sheet
         solid = free_triangles(solid, around, h)[0]
     free = np.concatenate([solid, sheet])
     skin = Skin(free[Surface.areas_of(free) > 0.0])

@@ -1,13 +1,13 @@
 """Winding numbers of closed surfaces: how often a ray leaves the surface more often than it enters it.
 
 Much faster than solid angles, and exact: a ray along no special direction meets an edge next to never. An open surface is closed
-by a cone over its open edges, whose own solid angle is then taken off again.
+by cones over its open edges, whose own solid angle is then taken off again.
 """
 
 import numpy as np
 import warp as wp
 
-from sampler.topology import edges_of, merge_points
+from sampler.topology import edges_of, link_items, merge_points
 
 _LEAN = wp.constant(wp.vec2(0.31371927, 0.17334821))  # x and y of the rays per z; no edge of a drawing runs so
 
@@ -68,14 +68,20 @@ def count_leavings(mesh: wp.uint64, points: wp.array(dtype=wp.vec3), first: int,
 
 
 def closing_cone(triangles: np.ndarray) -> np.ndarray:
-    """Triangles that close others, shape (n, 3, 3): from every edge that runs more often one way than the other to one point."""
+    """Triangles that close others, shape (n, 3, 3): cones over the edges that run more often one way than the other.
+
+    Each connected line of edges has its own apex, so that seen from afar its cone is next to nothing.
+    """
     corners = triangles.reshape(-1, 3)
     _, first, vertex = np.unique(merge_points(corners, 0.0), return_index=True, return_inverse=True)
     edges = edges_of(vertex.reshape(-1, 3))
     edge = np.repeat(np.arange(len(edges.ends)), edges.degree)
     surplus = np.bincount(edge, np.where(edges.forward, 1, -1)).astype(int)
     surplus[edges.ends[:, 0] == edges.ends[:, 1]] = 0
-    low, high = corners[first[np.repeat(edges.ends, np.abs(surplus), axis=0)]].transpose(1, 0, 2)
+    ends = np.repeat(edges.ends, np.abs(surplus), axis=0)
+    line = link_items(len(first), *ends.T)[0][ends[:, 0]]
+    low, high = corners[first[ends]].transpose(1, 0, 2)
     forward = np.repeat(surplus > 0, np.abs(surplus))[:, None]
-    apex = np.broadcast_to(0.5 * (low.min(axis=0) + high.max(axis=0)) if len(low) else np.zeros(3), low.shape)
-    return np.stack([np.where(forward, high, low), np.where(forward, low, high), apex], axis=1)
+    number = np.maximum(np.bincount(line), 1)[:, None]
+    apex = np.stack([np.bincount(line, x, len(number)) for x in 0.5 * (low + high).T], axis=1) / number
+    return np.stack([np.where(forward, high, low), np.where(forward, low, high), apex[line]], axis=1)

@@ -1,6 +1,7 @@
 """From a mesh to a particle body: repair, skin, particles, mass."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import trimesh
@@ -11,7 +12,7 @@ from sampler.inset import inset_particles
 from sampler.mass import integrate, is_physical
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
 from sampler.sheets import closed_triangles
-from sampler.skin import Skin, coincidence, free_triangles
+from sampler.skin import Skin, free_triangles
 from sampler.spreading import Observer, lattice_spacing, measure_evenness, particle_count, spread_particles
 from sampler.surface import Surface
 
@@ -22,9 +23,7 @@ _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest 
 _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
 _WALL_SAMPLES = 4000
-_PLACES = 60  # per particle, to move buried ones to
-_HALVINGS = 8  # of the way there, to move no farther than needed
-_CROWDED = 0.4  # distance from another particle, in spacings, below which one that was moved goes where there is most room
+_ASIDE = (0.01, 0.03, 0.09)  # ways from the crease between two parts that are tried, in spacings
 
 Progress = Callable[[float], None]
 
@@ -74,17 +73,17 @@ def sample_body(
     rough = float(Surface.areas_of(closed).sum())
     fine = _spacing(radius, spacing, count, grain, rough)
     around = Surface(closed, device)
-    free, parent = free_triangles(closed, around, fine)
+    free, parent, layers = free_triangles(closed, around, fine)
     solid, cut = around, not np.array_equal(np.unique(parent, return_counts=True)[1], np.ones(len(free)))
     warnings = list(repaired.report.warnings)
-    volume, centre, inertia = _mass(closed, free, parent, around, warnings)
+    volume, centre, inertia = _mass(closed, free, parent, layers, around, warnings)
     if thickness <= 2.0 * radius and np.any(owner == SHEET):
         # One layer in the sheets; the skin of the solids ends only where it is buried in other solids.
         free = repaired.triangles[repaired.kind == SHEET]
         cut = np.any(owner != SHEET)
         if cut:
             solid = Surface(closed[owner != SHEET], device)
-            sheet, _ = free_triangles(free, solid, fine, two_sided=True)
+            sheet = free_triangles(free, solid, fine)[0]
             free = np.concatenate([free_triangles(solid.triangles, solid, fine)[0], sheet])
         free = free[Surface.areas_of(free) > 0.0]
     if not len(free):
@@ -98,9 +97,9 @@ def sample_body(
                 f"a surface of {area:.3g} m^2 would need {number:.2g} particles of radius {radius:.3g} m; "
                 "check the mesh's scale, or take larger particles"
             )
-        points, normals = spread_particles(skin, number, seed, progress, observe)
-        if cut:
-            points, normals = _unbury(points, normals, skin, solid)
+        h = lattice_spacing(area, number)
+        settle = partial(_clear_creases, skin=skin, solid=solid, spacing=h) if cut else lambda *placed: placed
+        points, normals = spread_particles(skin, number, seed, progress, observe, settle)
         evenness = measure_evenness(skin, points, normals)
         h = lattice_spacing(area, len(points))
         if grain is None or evenness.coverage * h < radius + grain:
@@ -131,42 +130,25 @@ def sample_body(
     )
 
 
-def _unbury(points: np.ndarray, normals: np.ndarray, skin: Skin, solid: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Move particles that are a little inside another part, at the border of a cut surface, to just outside of it."""
-
-    def is_free(places, up):
-        return np.abs(solid.winding(places + 2e-5 * solid.unit * up)) < 0.5
-
-    buried = np.flatnonzero(~is_free(points, normals))
-    if not len(buried):
-        return points, normals
-    reach = lattice_spacing(float(skin.areas.sum()), len(points))
-    places, up = skin.sample(_PLACES * len(points), np.random.default_rng(2))
-    near = np.zeros(len(places), bool)
-    for i in buried:
-        near |= np.linalg.norm(places - points[i], axis=1) < reach
-    places, up = places[near], up[near]
-    open_ = is_free(places, up)
-    places, up = places[open_], up[open_]
-    if not len(places):
-        return points, normals
-    nearest = np.array([np.argmin(np.linalg.norm(places - points[i], axis=1)) for i in buried])
-    begin, end = points[buried], places[nearest]
-    points[buried], normals[buried] = end, up[nearest]
-    inside, outside = np.zeros((len(buried), 1)), np.ones((len(buried), 1))
-    for _ in range(_HALVINGS):
-        share = 0.5 * (inside + outside)
-        trial, face = skin.closest(begin + share * (end - begin))
-        free = is_free(trial, skin.normals[face])
-        points[buried[free]], normals[buried[free]] = trial[free], skin.normals[face[free]]
-        inside, outside = np.where(free[:, None], inside, share), np.where(free[:, None], share, outside)
-    for i in buried:
-        away = np.linalg.norm(points - points[i], axis=1)
-        others = points[(away < 2.0 * reach) & (np.arange(len(points)) != i)]
-        around = np.flatnonzero(np.linalg.norm(places - points[i], axis=1) < reach)
-        if len(others) and len(around) and np.partition(away, 1)[1] < _CROWDED * reach:
-            k = around[np.argmax(np.linalg.norm(places[around, None] - others, axis=2).min(axis=1))]
-            points[i], normals[i] = places[k], up[k]
+def _clear_creases(
+    points: np.ndarray, normals: np.ndarray, skin: Skin, solid: Surface, spacing: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Take particles in the crease between two parts a little away from it, so that they look out of the solid."""
+    _, face = skin.closest(points, up=normals)
+    corner = skin.triangles[face]
+    inward = np.cross(skin.normals[face][:, None], np.roll(corner, -1, axis=1) - corner)
+    inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), np.finfo(float).tiny)
+    depth = np.einsum("nij,nij->ni", points[:, None] - corner, inward)  # below each edge of the piece
+    away = inward[np.arange(len(points)), depth.argmin(axis=1)]
+    begin = points
+    points = points.copy()
+    for share in _ASIDE:
+        buried = np.flatnonzero(np.abs(solid.winding(points + 2e-5 * solid.unit * normals)) > 0.5)
+        if not len(buried):
+            break
+        aside, face = skin.closest(begin[buried] + share * spacing * away[buried], up=normals[buried])
+        same = np.einsum("ij,ij->i", skin.normals[face], normals[buried]) > 0.9  # not over to the other part
+        points[buried[same]] = aside[same]
     return points, normals
 
 
@@ -188,16 +170,14 @@ def _spacing(radius, spacing, count, grain, area) -> float:
     return fine if grain is None else min(fine, _CLOSED * (radius + grain) / _COVERED)
 
 
-def _mass(closed, free, parent, around, warnings) -> tuple[float, np.ndarray, np.ndarray]:
+def _mass(closed, free, parent, layers, around, warnings) -> tuple[float, np.ndarray, np.ndarray]:
     """From all triangles where none is buried, else from the free parts."""
     whole = np.bincount(parent, minlength=len(closed)) == (Surface.areas_of(closed) > 0.0)
     if np.all(whole):
         volume, centre, inertia = integrate(closed)
     else:
-        normals = np.cross(free[:, 1] - free[:, 0], free[:, 2] - free[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-        volume, centre, inertia = integrate(free, 1.0 / coincidence(free.mean(axis=1), normals, around))
-        warnings.append("parts of the surface are buried in others; volume and inertia are those of the union, to about 0.1 %")
+        volume, centre, inertia = integrate(free, 1.0 / layers)
+        warnings.append("parts of the surface are buried in others; volume and inertia are those of the union")
     low, high = closed.min(axis=(0, 1)), closed.max(axis=(0, 1))
     if is_physical(volume, centre, inertia, low, high):
         return volume, centre, inertia

@@ -2,26 +2,37 @@
 
 import numpy as np
 
-from sampler.crossing import crossed_pieces
+from sampler.crossing import count_layers, crossing_planes, cut_triangles
 from sampler.surface import Surface
 
 _STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what is there
 _TRIAL = 4000  # random places that show whether anything is buried at all
-_DEEPEST = 20  # halvings of a triangle that is partly buried
-_ISLAND, _FINEST = 1.5, 0.15  # triangles larger than this may hold islands; smaller ones are not cut further; in spacings
-_MOST = 10  # partly buried triangles per particle to come, after which only large ones are cut
+_DEEPEST = 400  # cuts through one triangle
+_ISLAND = 1.5  # triangles longer than this are halved, others cut along the planes that cross them; in spacings
+_MOST, _FINEST = 10, 0.5  # cuts per particle to come, after which only triangles longer than so many spacings are cut
 
 
 class Skin(Surface):
     """Triangles with what random sampling and Warp kernels need."""
 
-    def sample(self, number: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    def places(self, number: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+        """Random places, so many over the area and as many over the longest edges, so that narrow strips get their share."""
+        length = np.linalg.norm(self.triangles - np.roll(self.triangles, -1, axis=1), axis=2).max(axis=1)
+        both = self.sample(number, random), self.sample(number, random, length)
+        return tuple(np.concatenate(pair) for pair in zip(*both, strict=True))
+
+    def sample(self, number: int, random: np.random.Generator, weight: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Random places, stratified over the area.
+
+        Args:
+            number: of places.
+            random: where chance comes from.
+            weight: of the triangles, instead of their areas.
 
         Returns:
             Points, shape (number, 3) [m], and the normals of their triangles, shape (number, 3).
         """
-        share = np.cumsum(self.areas)
+        share = np.cumsum(self.areas if weight is None else weight)
         at = (np.arange(number) + random.random(number)) / number * share[-1]
         face = np.minimum(np.searchsorted(share, at), len(share) - 1)
         u = random.random((number, 2))
@@ -31,59 +42,46 @@ class Skin(Surface):
         return points, self.normals[face]
 
 
-def free_triangles(
-    triangles: np.ndarray, around: Surface, spacing: float, two_sided: bool = False
-) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles, or parts of them, that have an outside before them and an inside behind them.
+def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles, or parts of them, that have an outside on any side: walls as thin as paper, and sheets, have it on both.
 
     Args:
         triangles: shape (n, 3, 3) [m].
         around: all closed surfaces, these among them.
         spacing: of the particles to come [m].
-        two_sided: the triangles are sheets, free where any of their sides is.
 
     Returns:
-        Shape (m, 3, 3) [m], and the given triangle that each is part of, shape (m,).
+        Shape (m, 3, 3) [m]; the given triangle that each is part of, shape (m,); how many lie on one another there, shape (m,).
     """
     parent = np.flatnonzero(Surface.areas_of(triangles) > 0.0)
     triangles = triangles[parent]
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
-    if _free(places, normals, around, two_sided).all():
-        return triangles, parent
-    coincide = np.any(coincidence(places, normals, around) > 1)
-    most = _MOST * float(Surface.areas_of(triangles).sum()) / spacing**2
-    pieces, parents, mixed = [], [], 0
-    for depth in range(_DEEPEST + 1):
+    if _ask(places, normals, around)[0].all():
+        return triangles, parent, np.ones(len(parent), int)
+    most = len(triangles) // 2 + _MOST * float(Surface.areas_of(triangles).sum()) / spacing**2
+    pieces, parents, cuts = [], [], 0
+    for _ in range(_DEEPEST):
         edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
-        cut = (edge > (_FINEST if mixed < most else _ISLAND) * spacing) & (depth < _DEEPEST)
-        cut[cut] = crossed_pieces(triangles[cut], around, _STEP * around.unit)
-        small = np.flatnonzero(cut & (edge <= _ISLAND * spacing))
-        cut[small] = _is_mixed(triangles[small], around, coincide)
-        mixed += int(cut[small].sum())
-        pieces.append(triangles[~cut])
-        parents.append(parent[~cut])
-        triangles, parent = _halve(triangles[cut]), np.tile(parent[cut], 2)
+        worth = np.flatnonzero(edge > (0.0 if cuts < most else _FINEST * spacing))
+        crossed, normals, places = crossing_planes(triangles[worth], around, _STEP * around.unit)
+        crossed = worth[crossed]
+        sound = np.ones(len(triangles), bool)
+        sound[crossed] = False
+        cuts += len(crossed)
+        pieces.append(triangles[sound])
+        parents.append(parent[sound])
+        triangles, parent, edge = triangles[crossed], parent[crossed], edge[crossed]
         if not len(triangles):
             break
+        small = edge <= _ISLAND * spacing
+        parts, origin = cut_triangles(triangles[small], normals[small], places[small])
+        triangles = np.concatenate([_halve(triangles[~small]), parts])
+        parent = np.concatenate([np.tile(parent[~small], 2), parent[small][origin]])
+    pieces.append(triangles)
+    parents.append(parent)
     pieces, parents = np.concatenate(pieces), np.concatenate(parents)
-    free = _free(pieces.mean(axis=1), _normals(pieces), around, two_sided)
-    return pieces[free], parents[free]
-
-
-def _is_mixed(pieces: np.ndarray, around: Surface, coincide: bool) -> np.ndarray:
-    """Whether what lies before a piece at its rim differs from what lies before its middle; behind it, too, if asked for.
-
-    Where two surfaces that coincide part, pieces must end, so that each is covered as often all over.
-    """
-    centre, normal = pieces.mean(axis=1, keepdims=True), _normals(pieces)[:, None]
-    rim = np.concatenate([pieces, 0.5 * (pieces + np.roll(pieces, -1, axis=1))], axis=1)  # corners and midpoints
-    places = np.concatenate([centre, 0.98 * rim + 0.02 * centre], axis=1)
-    mixed = np.zeros(len(pieces), bool)
-    for side in (1.0, -1.0) if coincide else (1.0,):
-        number = np.abs(around.winding((places + side * _STEP * around.unit * normal).reshape(-1, 3))).reshape(-1, 7)
-        state = number < 0.5 if side > 0.0 else np.rint(number)
-        mixed |= np.any(state != state[:, :1], axis=1)
-    return mixed
+    free, layers = _ask(pieces.mean(axis=1), _normals(pieces), around)
+    return pieces[free], parents[free], layers[free]
 
 
 def _normals(triangles: np.ndarray) -> np.ndarray:
@@ -91,19 +89,14 @@ def _normals(triangles: np.ndarray) -> np.ndarray:
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
 
 
-def coincidence(points: np.ndarray, normals: np.ndarray, around: Surface) -> np.ndarray:
-    """How many faces of closed surfaces lie on one another at places of theirs, at least 1, shape (n,) int."""
-    step = _STEP * around.unit * normals
-    before, behind = (np.abs(around.winding(points + side * step)) for side in (1.0, -1.0))
-    return np.maximum(np.rint(behind - before), 1).astype(int)
-
-
-def _free(points: np.ndarray, normals: np.ndarray, around: Surface, two_sided: bool) -> np.ndarray:
-    """Whether places of a surface are free."""
-    step = _STEP * around.unit * normals
-    before = np.abs(around.winding(points + step)) < 0.5
-    behind = np.abs(around.winding(points - step)) < 0.5
-    return (before | behind) if two_sided else (before != behind)
+def _ask(points: np.ndarray, normals: np.ndarray, around: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Whether places of a surface are free, and how many faces of closed surfaces lie on one another there, at least 1."""
+    step = _STEP * around.unit
+    before, layers = around.winding(points + step * normals), count_layers(points, normals, around, step)
+    free = np.abs(before) < 0.5
+    turned = np.flatnonzero(~free & (np.abs(before + layers) < 0.5))  # faces inward, it seems; thin slits may feign that
+    free[turned] = np.abs(around.winding(points[turned] - step * normals[turned])) < 0.5
+    return free, np.maximum(layers, 1)
 
 
 def _halve(triangles: np.ndarray) -> np.ndarray:

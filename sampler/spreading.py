@@ -13,17 +13,23 @@ from sampler.surface import launch_shares
 _SCATTERED = 12  # random places per wanted particle
 _HALVINGS = 7  # of the range in which the distance of the first placing is sought
 _TURNS, _REFILL_TURNS = 120, 30
-_REFILLS = 12
+_REFILLS = 16
 _SAMPLED = 40  # places per particle at which gaps are looked for
+_DOUBT = 0.08  # places so near to being a gap are looked at more closely, in spacings
+_CLOSER = (0.10, 0.10, 0.05, 0.05)  # how far beside them, in spacings
 _STRENGTH = 0.25  # of a push, in spacings
 _GAP, _SKIN_GAP = 0.78, 0.95  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
-_LEAST = 0.50  # particles nearer than this to one another are a fault, in spacings
+_GAPS_APART = 1.2  # gaps nearer than this to a deeper one wait, in spacings
+_LEAST = 0.40  # particles nearer than this to one another are a fault, in spacings
+_LONELY = 1.09  # and those farther than this from all others get a neighbour
 _AROUND = 4.0  # distance from a filled gap or a removed particle within which others move, in spacings
 _MEASURED = 100  # places per particle at which the result is measured
 _SPARE = 0.005  # share of the particles kept back for gaps, and share that may be added above the wanted number
-_PATIENCE = 4  # refills without improvement after which the best is taken
+_PATIENCE = 6  # refills without improvement after which the best is taken
 
 Observer = Callable[[np.ndarray], None]
+Settler = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+Places = tuple[np.ndarray, np.ndarray]  # on the surface, shape (n, 3) [m], and the normals there, shape (n, 3)
 
 
 def particle_count(area: float, spacing: float) -> int:
@@ -42,6 +48,7 @@ def spread_particles(
     seed: int = 0,
     progress: Callable[[float], None] = lambda share: None,
     observe: Observer | None = None,
+    settle: Settler = lambda points, normals: (points, normals),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Spread particles over a surface.
 
@@ -51,6 +58,7 @@ def spread_particles(
         seed: of the random start.
         progress: called with the share of the work done, 0 to 1.
         observe: called with the particles, shape (n, 3) [m], as they relax.
+        settle: moves particles a little, given their centres and normals, before they are judged.
 
     Returns:
         Particle centres on the surface, shape (number, 3) [m], and the normals of the triangles they lie on, shape (number, 3).
@@ -65,16 +73,18 @@ def spread_particles(
         progress((turn + 1) / total)
     state.crowding = state.crowd.numpy()
     state.pinned = np.zeros(start, bool)
-    samples = skin.sample(_SAMPLED * number, random)
+    places = skin.places(_SAMPLED * number, random)
     best, least, stuck = None, np.inf, 0
     for turn in range(_REFILLS + 1):
-        gaps, fault = state.gaps(*samples)
+        found = settle(*state.result())  # on an edge either face may be the nearest; judge by the final choice
+        state.points, state.normals = skin.shift(found[0]), state.vectors(found[1])
+        places, gaps, crowded, fault = state.faults(places, random)
         stuck = 0 if fault < least else stuck + 1
         if fault < least:
-            best, least = state.result(), fault
-        if not len(gaps) or turn == _REFILLS or stuck == _PATIENCE:
+            best, least = found, fault
+        if fault == 0.0 or turn == _REFILLS or stuck == _PATIENCE:
             break
-        state.refill(samples[0][gaps], samples[1][gaps], pin=turn > 0)
+        state.refill(places[0][gaps], places[1][gaps], crowded, pin=turn > 0)
         for k in range(_REFILL_TURNS):
             state.push(_STRENGTH * (0.6 - 0.5 * k / _REFILL_TURNS))
             progress((_TURNS + turn * _REFILL_TURNS + k) / total)
@@ -86,7 +96,8 @@ def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Eve
     """Measure particles, shape (n, 3) [m], with their normals, on the surface they lie on."""
     state = _State(skin, len(points), None)
     state.place(points, normals, np.zeros(len(points), bool))
-    free, own, nearest = state.distances(*skin.sample(_MEASURED * len(points), np.random.default_rng(1)))
+    free, own = state.distances(*skin.places(_MEASURED * len(points), np.random.default_rng(1)))
+    nearest = state.nearest()
     variation = nearest.std() / nearest.mean()
     return Evenness(*map(float, (variation, nearest.min(), nearest.max(), free.max(), own.max())))
 
@@ -100,14 +111,14 @@ class _State:
         self.unit_spacing = self.spacing / skin.unit
         self.grid = wp.HashGrid(128, 128, 128, device=self.device)
         self.corners = skin.shift(skin.triangles.reshape(-1, 3))
-        self.face_normals = self._vectors(skin.normals)
+        self.face_normals = self.vectors(skin.normals)
         self.most = number + int(_SPARE * number)
 
-    def _vectors(self, values: np.ndarray) -> wp.array:
+    def vectors(self, values: np.ndarray) -> wp.array:
         return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
 
     def place(self, points: np.ndarray, normals: np.ndarray, held: np.ndarray) -> None:
-        self.points, self.normals = self.skin.shift(points), self._vectors(normals)
+        self.points, self.normals = self.skin.shift(points), self.vectors(normals)
         self.held = wp.array(held.astype(np.int32), dtype=int, device=self.device)
         self.moved, self.moved_normals = wp.empty_like(self.points), wp.empty_like(self.normals)
         self.crowd = wp.zeros(len(points), dtype=float, device=self.device)
@@ -127,50 +138,78 @@ class _State:
         return self.points.numpy() * self.skin.unit + self.skin.centre
 
     def result(self) -> tuple[np.ndarray, np.ndarray]:
-        points, face = self.skin.closest(self.positions())
+        points, face = self.skin.closest(self.positions(), up=self.normals.numpy())
         return points, self.skin.normals[face]
 
-    def gaps(self, places: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, float]:
-        """Places in gaps, the deepest first and none near a deeper one; and the sum of all faults."""
-        self.normals = self._vectors(self.result()[1])  # on an edge either face may be the nearest; judge by the final choice
-        free, own, nearest = self.distances(places, normals)
-        excess = np.maximum(free - _GAP, own - _SKIN_GAP)
-        found = np.flatnonzero(excess > 0.0)
-        found = found[np.argsort(-excess[found], kind="stable")]
-        chosen: list[int] = []
-        for k in found:
-            near = np.linalg.norm(places[chosen] - places[k], axis=1) < 1.2 * self.spacing
-            if not near.any() and len(chosen) < max(4, len(self.points) // 20):
-                chosen.append(int(k))
-        open_ = np.maximum(free[chosen] - _GAP, 0.0).sum()
-        fault = float(4.0 * open_ + excess[chosen].sum() + np.maximum(_LEAST - nearest, 0.0).sum())
-        return np.array(chosen, int), fault
+    def faults(self, places: Places, random: np.random.Generator) -> tuple[Places, np.ndarray, np.ndarray, float]:
+        """What is wrong, judged at places with their normals.
 
-    def distances(self, places: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Distance of places from the nearest particle and the nearest on their own skin, at most 2; of particles from others.
-
-        All in spacings.
+        Returns:
+            More places, where it was in doubt; which of them to fill, the worst first and none near a worse one; particles too
+            near to others; the sum of all faults.
         """
+        nearest, found = self.nearest(), self.distances(*places)
+        for _ in range(2):
+            closer = self._beside(places, np.flatnonzero(_excess(*found) > -_DOUBT)[: len(self.points)], random)
+            places, found = _joined(places, closer), _joined(found, self.distances(*closer))
+        free, excess = found[0], _excess(*found)
+        for i in np.flatnonzero(nearest > _LONELY):
+            away = np.linalg.norm(places[0] - self.positions()[i], axis=1) / self.spacing
+            beside = np.flatnonzero((away < 1.0) & (away > 0.6))
+            if len(beside):
+                k = beside[free[beside].argmax()]
+                excess[k] = max(excess[k], nearest[i] - _LONELY)
+        crowded = np.flatnonzero(nearest < _LEAST)
+        crowded = crowded[np.lexsort((nearest[crowded], self.pinned[crowded]))]
+        chosen: list[int] = []
+        left = np.argsort(-excess, kind="stable")[: np.count_nonzero(excess > 0.0) + len(self.points)]
+        while len(left) and len(chosen) < (max(4, len(self.points) // 20) if excess[left[0]] > 0.0 else len(crowded) / 2):
+            chosen.append(int(left[0]))
+            left = left[np.linalg.norm(places[0][left] - places[0][left[0]], axis=1) > _GAPS_APART * self.spacing]
+        gaps = np.array(chosen, int)
+        open_ = np.maximum(free[gaps] - _GAP, 0.0).sum()
+        fault = float(4.0 * open_ + np.maximum(excess[gaps], 0.0).sum() + (_LEAST - nearest[crowded]).sum())
+        return places, gaps, crowded, fault
+
+    def _beside(self, places: Places, doubtful: np.ndarray, random: np.random.Generator) -> Places:
+        """Places a little aside of doubtful ones."""
+        points, normals = (np.tile(values[doubtful], (len(_CLOSER), 1)) for values in places)
+        aside = np.repeat(_CLOSER, len(doubtful))[:, None] * self.spacing * random.standard_normal(points.shape)
+        points, face = self.skin.closest(points + aside, up=normals)
+        return points, self.skin.normals[face]
+
+    def distances(self, places: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distance of places from the nearest particle and from the nearest on their own skin, at most 2; in spacings."""
         reach = 2.0 * self.unit_spacing
-        self.grid.build(self.points, reach)
-        free, own = (wp.empty(len(places), dtype=float, device=self.device) for _ in range(2))
-        inputs = [self.grid.id, self.points, self.normals, self.skin.shift(places), self._vectors(normals), reach]
-        launch_shares(find_gaps, len(places), inputs, [free, own], self.device)
+        self.grid.build(self.points, 0.5 * reach)
+        found = tuple(wp.empty(len(places), dtype=float, device=self.device) for _ in range(2))
+        inputs = [self.grid.id, self.points, self.normals, self.skin.shift(places), self.vectors(normals), reach]
+        launch_shares(find_gaps, len(places), inputs, list(found), self.device)
+        return tuple(values.numpy() / self.unit_spacing for values in found)
+
+    def nearest(self) -> np.ndarray:
+        """Distance of particles from the nearest other one, at most 2; in spacings."""
+        reach = 2.0 * self.unit_spacing
+        self.grid.build(self.points, 0.5 * reach)
         nearest = wp.empty(len(self.points), dtype=float, device=self.device)
         launch_shares(find_nearest, len(self.points), [self.grid.id, self.points, reach], [nearest], self.device)
-        return tuple(found.numpy() / self.unit_spacing for found in (free, own, nearest))
+        return nearest.numpy() / self.unit_spacing
 
-    def refill(self, places: np.ndarray, normals: np.ndarray, pin: bool) -> None:
-        """Move the most crowded particles into gaps; pinned ones stay there. Only what is near moves afterwards."""
+    def refill(self, places: np.ndarray, normals: np.ndarray, crowded: np.ndarray, pin: bool) -> None:
+        """Move particles that are too near to others, and the most crowded ones, into gaps; pinned ones stay there.
+
+        Only what is near moves afterwards.
+        """
         points, up = self.positions(), self.normals.numpy()
         taken: list[int] = []
         added = max(0, min(self.most - len(points), len(places)))
-        for k in np.argsort(-self.crowding, kind="stable"):
-            if len(taken) == len(places) - added:
+        for rank, k in enumerate([*crowded, *np.argsort(-self.crowding, kind="stable")]):
+            if len(taken) == len(places) or (rank >= len(crowded) and len(taken) >= len(places) - added):
                 break
-            around = np.concatenate([places, points[taken]])
-            if not self.pinned[k] and np.linalg.norm(around - points[k], axis=1).min() > 2.0 * self.spacing:
+            way = np.linalg.norm(np.concatenate([places, points[taken]]) - points[k], axis=1).min()
+            if (rank < len(crowded) or not self.pinned[k]) and way > 2.0 * self.spacing:
                 taken.append(int(k))
+        added = min(added, len(places) - len(taken))
         places, normals = places[: len(taken) + added], normals[: len(taken) + added]
         changed = np.concatenate([places, points[taken]])
         keep = np.ones(len(points), bool)
@@ -182,6 +221,15 @@ class _State:
         for place in changed:
             moving |= np.linalg.norm(points - place, axis=1) < _AROUND * self.spacing
         self.place(points, up, self.pinned | ~moving)
+
+
+def _joined(*pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    return tuple(np.concatenate(values) for values in zip(*pairs, strict=True))
+
+
+def _excess(free: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """By how much places lie in gaps, in spacings."""
+    return np.maximum(free - _GAP, own - _SKIN_GAP)
 
 
 def _throw(skin: Skin, number: int, spacing: float, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

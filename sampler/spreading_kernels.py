@@ -2,13 +2,14 @@
 
 import warp as wp
 
-from sampler.surface import nearest_face
+from sampler.surface import ASIDE, nearest_face
 
 MODULE = "sampler_spreading"
 
 _SAME = wp.constant(-0.2)  # cosine between normals from which two places lie on one skin
 _OTHER = wp.constant(-0.7)  # and below which they lie on different skins
 _ACROSS = wp.constant(0.8)  # range of the repulsion between skins, of that on one skin
+_CORE, _HARD = wp.constant(8.0), wp.constant(0.6)  # strength and range, in spacings, of what keeps particles apart in any case
 _FARTHEST = wp.constant(0.3)  # of a step, in spacings
 
 
@@ -78,13 +79,14 @@ def push_apart(
                 same = same_skin(up, normals[j])
                 # The two skins of a thin wall only keep their particles from lying on top of one another.
                 weight = repulsion(distance, spacing * (_ACROSS + (1.0 - _ACROSS) * same))
+                weight += _CORE * wp.max(_HARD - distance / spacing, 0.0)
                 crowd += same * weight
                 push += away * (weight / wp.max(distance, 1.0e-3 * spacing))
     crowding[i] = crowd
     step = push * strength
     step *= wp.min(1.0, _FARTHEST * spacing / wp.max(wp.length(step), 1.0e-12))
     there = here + step
-    face = nearest_face(mesh, there, 1.01 * wp.length(step) + 1.0e-3 * spacing)
+    face = nearest_face(mesh, there, 1.01 * wp.length(step) + 1.0e-3 * spacing, up, ASIDE)
     if face >= 0:
         moved[i] = closest_point(corners[3 * face], corners[3 * face + 1], corners[3 * face + 2], there)
         moved_normals[i] = face_normals[face]
@@ -167,9 +169,14 @@ def find_gaps(
     here = samples[i]
     best = reach
     own = reach
-    for j in wp.hash_grid_query(grid, here, reach):
+    near = 0.5 * reach
+    for j in wp.hash_grid_query(grid, here, near):
         best = wp.min(best, wp.length(points[j] - here))
         own = wp.min(own, way_along(here, sample_normals[i], points[j], normals[j]))
+    if own > near:  # next to never
+        for j in wp.hash_grid_query(grid, here, reach):
+            best = wp.min(best, wp.length(points[j] - here))
+            own = wp.min(own, way_along(here, sample_normals[i], points[j], normals[j]))
     distance[i] = best
     own_distance[i] = own
 

@@ -10,6 +10,7 @@ import warp as wp
 from sampler.rays import closing_cone, count_leavings
 
 _TOGETHER = 2000  # points below which a second core is not worth its start
+ASIDE = wp.constant(1.0e-5)  # of the diagonal: how much nearer the wrong side of a wall must be to be taken
 _RAGGED = 0.5  # open edges per triangle from which solid angles are as fast
 
 
@@ -17,6 +18,7 @@ _RAGGED = 0.5  # open edges per triangle from which solid angles are as fast
 _NEAREST = """
     using namespace wp;
     const Mesh mesh = mesh_get(id);
+    const vec3d side(up[0], up[1], up[2]);
     int stack[BVH_QUERY_STACK_SIZE];
     int count = 1, best = -1;
     stack[0] = *mesh.bvh.root;
@@ -50,6 +52,8 @@ _NEAREST = """
                     if (d < distance) distance = d;
                 }
                 if (within) distance = dot(corner[0], n) * dot(corner[0], n) / area;
+                const double facing = dot(n, side);
+                if (facing < 0.0 && facing * facing > 0.5 * area) distance += (double)aside * aside;
                 if (distance < least) { least = distance; best = face; }
             }
         } else {
@@ -69,8 +73,12 @@ _NEAREST = """
 
 
 @wp.func_native(_NEAREST)
-def nearest_face(id: wp.uint64, p: wp.vec3, limit: float) -> int:
-    """Triangle of a mesh nearest to a point, measured in double precision; -1 where none is within the limit."""
+def nearest_face(id: wp.uint64, p: wp.vec3, limit: float, up: wp.vec3, aside: float) -> int:
+    """Triangle of a mesh nearest to a point, measured in double precision; -1 where none is within the limit.
+
+    Triangles that face away from the unit vector ``up`` count as ``aside`` farther where they are near: of two that coincide,
+    the one on the wanted side is found.
+    """
     ...
 
 
@@ -82,11 +90,16 @@ def winding_number(id: wp.uint64, p: wp.vec3) -> float:
 
 @wp.kernel(enable_backward=False, module="sampler_surface")
 def find_closest(
-    mesh: wp.uint64, points: wp.array(dtype=wp.vec3), limit: wp.array(dtype=float), first: int, face: wp.array(dtype=int)
+    mesh: wp.uint64,
+    points: wp.array(dtype=wp.vec3),
+    limit: wp.array(dtype=float),
+    up: wp.array(dtype=wp.vec3),
+    first: int,
+    face: wp.array(dtype=int),
 ):
     """Triangle nearest to each point, -1 where none is within its limit."""
     i = first + wp.tid()
-    face[i] = nearest_face(mesh, points[i], limit[i])
+    face[i] = nearest_face(mesh, points[i], limit[i], up[i], ASIDE)
 
 
 @wp.kernel(enable_backward=False, module="sampler_surface")
@@ -152,12 +165,15 @@ class Surface:
         moved = ((np.asarray(points, float) - self.centre) / self.unit).astype(np.float32)
         return wp.array(moved, dtype=wp.vec3, device=self.device)
 
-    def closest(self, points: np.ndarray, limit: np.ndarray | float | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def closest(
+        self, points: np.ndarray, limit: np.ndarray | float | None = None, up: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Closest points of the triangles.
 
         Args:
             points: shape (n, 3) [m].
             limit: farthest to look [m]; everywhere if None.
+            up: unit vectors, shape (n, 3); of triangles in one place those that face their way are taken.
 
         Returns:
             Closest points, shape (n, 3) [m]; triangles they lie on, shape (n,), -1 and the point itself where there is none.
@@ -168,7 +184,8 @@ class Surface:
         limit = np.broadcast_to(np.asarray(limit, float) / self.unit, len(points)).astype(np.float32)
         face = wp.empty(len(points), dtype=int, device=self.device)
         limit = wp.array(limit, dtype=float, device=self.device)
-        self._launch(find_closest, [self.shift(points), limit], [face])
+        up = wp.array(np.zeros_like(points) if up is None else up, dtype=wp.vec3, device=self.device)
+        self._launch(find_closest, [self.shift(points), limit, up], [face])
         face = face.numpy()
         nearest = points.copy()
         found = face >= 0

@@ -52,14 +52,13 @@ def test_solids_are_covered_evenly(shape, count):
     assert near.std() / near.mean() <= (0.065 if shape == "box" else 0.05)
     assert near.min() >= (0.6 if shape == "box" else 0.75)
     assert near.max() <= 1.10
-    assert distances(surface_samples(mesh)[0], body.points).max() <= 0.80 * h
-    assert body.evenness.coverage * body.spacing == pytest.approx(
-        distances(surface_samples(mesh)[0], body.points).max(), rel=0.08
-    )
+    farthest = distances(surface_samples(mesh, 100 * count)[0], body.points).max()
+    assert farthest <= 0.80 * h
+    assert body.evenness.coverage * body.spacing == pytest.approx(farthest, rel=0.08)
     assert np.abs(SignedDistance(mesh).query(body.points)[0]).max() < 1e-3 * body.radius
 
 
-@pytest.mark.parametrize("share", [0.003, 0.02])
+@pytest.mark.parametrize("share", [1e-9, 1e-6, 0.003, 0.02])
 def test_both_skins_of_a_plate_are_covered(share):
     plate = trimesh.creation.box((0.1, 0.06, 0.1 * share))
     body = sample_body(plate, radius=0.002, count=800)
@@ -67,6 +66,42 @@ def test_both_skins_of_a_plate_are_covered(share):
     assert skin_gap(plate, body) <= body.spacing
     assert near.min() >= 0.35
     assert near.max() <= 1.10
+
+
+def crossing_fins():
+    """Blades much thinner than h that stand in a block, half a spacing from one another."""
+    blades = [trimesh.creation.box((0.0001, 0.03, 0.03)).apply_translation([x, 0, 0.02]) for x in np.linspace(-0.025, 0.025, 9)]
+    return trimesh.util.concatenate([trimesh.creation.box((0.06, 0.04, 0.02)), *blades])
+
+
+def narrow_lip():
+    """A block in a thin frame, so that a lip half a spacing wide runs around it."""
+    return trimesh.util.concatenate([trimesh.creation.box((0.1, 0.1, 0.03)), trimesh.creation.box((0.108, 0.108, 0.0001))])
+
+
+def teeth():
+    """Blocks a little thicker than half a spacing and as far apart."""
+    blocks = [trimesh.creation.box((0.004, 0.03, 0.03)).apply_translation([x, 0, 0.02]) for x in np.linspace(-0.025, 0.025, 9)]
+    return trimesh.util.concatenate([trimesh.creation.box((0.06, 0.04, 0.02)), *blocks])
+
+
+@pytest.mark.parametrize("shape", [crossing_fins, narrow_lip, teeth])
+def test_ledges_narrower_than_a_spacing_are_covered(shape):
+    count = 1000 if shape is crossing_fins else 600
+    body = sample_body(shape(), radius=0.002, count=count)
+    near = neighbours(body.points) / body.spacing
+    assert abs(len(body) - count) <= 0.01 * count
+    assert near.min() >= 0.35
+    assert near.max() <= 1.10
+    assert body.evenness.coverage <= 0.80
+    assert body.evenness.skin_coverage <= 1.0
+
+
+def test_particles_keep_their_side_of_paper():
+    paper = trimesh.creation.box((0.1, 0.06, 1e-9))
+    body = sample_body(paper, radius=0.002, count=400)
+    assert body.evenness.skin_coverage <= 1.0
+    assert 150 < np.count_nonzero(body.normals[:, 2] > 0.5) < 250
 
 
 def test_acute_edges_are_covered():
@@ -138,7 +173,7 @@ def test_contact_normals_lean_as_much_as_is_told(grain):
     nearest = distances(np.column_stack([places, np.full(len(places), 0.01)]), top)
     lean = np.arcsin(nearest / (body.radius + grain))  # of a grain let down there until it touches
     assert lean.max() <= body.roughness(grain)
-    assert lean.max() >= 0.85 * body.roughness(grain)
+    assert lean.max() >= 0.8 * body.roughness(grain)  # the widest place lies elsewhere
 
 
 def test_inset_keeps_the_outer_size():
