@@ -27,7 +27,7 @@ from sand_sim.integrator import VERLET
 
 _ROOM_TO_SPARE = 1.1
 _FIRST_PAIRS = 3  # room for contacts per grain to begin with
-_FIRST_OTHERS = 0.25  # the same at walls and at tools
+_FIRST_OTHERS = 0.125  # the same at walls and at tools
 
 
 @dataclass(frozen=True)
