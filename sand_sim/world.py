@@ -244,6 +244,7 @@ class World(Changeable):
 
     def save(self) -> dict[str, np.ndarray]:
         """The whole state as plain arrays; put back with ``restore`` it goes on to the bit."""
+        self._solver.renew_lists()  # as the next step would; so a state is the same whether somebody has looked or not
         state = self._solver.take_state()
         for name in Track.__dataclass_fields__:
             state[f"track.{name}"] = np.array([getattr(track, name) for track in self._tracks])
