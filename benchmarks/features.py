@@ -1,9 +1,8 @@
 """What each feature costs when switched on: time of a sphere and step in a packed bed, relative to frictionless spheres.
 
 Every case is the same cube of touching spheres, held in a box without gravity; what grains of several spheres cost W2 of
-``sand_sim bench`` tells. All cases run in turn, round after round, so that a
-busy machine slows all of them alike. Prints one JSON line per case. Run from the root of the source tree:
-``python -m benchmarks.features``.
+``sand_sim bench`` tells. All cases run in turn, round after round, so that a busy machine slows all of them alike. Prints one
+JSON line per case. Run from the root of the source tree: ``python -m benchmarks.features``.
 """
 
 import argparse

@@ -12,7 +12,7 @@ from sampler.inset import inset_particles
 from sampler.mass import integrate, is_physical
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
 from sampler.sheets import closed_triangles
-from sampler.skin import Skin, free_triangles
+from sampler.skin import Skin, free_triangles, winding_before
 from sampler.spreading import Observer, lattice_spacing, measure_evenness, particle_count, spread_particles
 from sampler.surface import Surface
 
@@ -143,7 +143,7 @@ def _clear_creases(
     begin = points
     points = points.copy()
     for share in _ASIDE:
-        buried = np.flatnonzero(np.abs(solid.winding(points + 2e-5 * solid.unit * normals)) > 0.5)
+        buried = np.flatnonzero(np.abs(winding_before(points, normals, solid)) > 0.5)
         if not len(buried):
             break
         aside, face = skin.closest(begin[buried] + share * spacing * away[buried], up=normals[buried])

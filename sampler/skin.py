@@ -80,22 +80,21 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
     pieces.append(triangles)
     parents.append(parent)
     pieces, parents = np.concatenate(pieces), np.concatenate(parents)
-    free, layers = _ask(pieces.mean(axis=1), _normals(pieces), around)
+    free, layers = _ask(pieces.mean(axis=1), Surface.normals_of(pieces), around)
     return pieces[free], parents[free], layers[free]
 
 
-def _normals(triangles: np.ndarray) -> np.ndarray:
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+def winding_before(points: np.ndarray, normals: np.ndarray, around: Surface) -> np.ndarray:
+    """Winding numbers of a surface just before places on it, shape (n, 3) [m], the way their normals point."""
+    return around.winding(points + _STEP * around.unit * normals)
 
 
 def _ask(points: np.ndarray, normals: np.ndarray, around: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Whether places of a surface are free, and how many faces of closed surfaces lie on one another there, at least 1."""
-    step = _STEP * around.unit
-    before, layers = around.winding(points + step * normals), count_layers(points, normals, around, step)
+    before, layers = winding_before(points, normals, around), count_layers(points, normals, around, _STEP * around.unit)
     free = np.abs(before) < 0.5
     turned = np.flatnonzero(~free & (np.abs(before + layers) < 0.5))  # faces inward, it seems; thin slits may feign that
-    free[turned] = np.abs(around.winding(points[turned] - step * normals[turned])) < 0.5
+    free[turned] = np.abs(winding_before(points[turned], -normals[turned], around)) < 0.5
     return free, np.maximum(layers, 1)
 
 

@@ -145,10 +145,7 @@ class Surface:
         self.triangles = np.asarray(triangles, float)
         low, high = self.triangles.min(axis=(0, 1)), self.triangles.max(axis=(0, 1))
         self.centre, self.unit = 0.5 * (low + high), float(np.linalg.norm(high - low))
-        cross = np.cross(self.triangles[:, 1] - self.triangles[:, 0], self.triangles[:, 2] - self.triangles[:, 0])
-        length = np.linalg.norm(cross, axis=1, keepdims=True)
-        self.areas = 0.5 * length[:, 0]
-        self.normals = np.divide(cross, length, out=np.zeros_like(cross), where=length > 0.0)
+        self.areas, self.normals = self.areas_of(self.triangles), self.normals_of(self.triangles)
         self.mesh = wp.Mesh(
             points=self.shift(self.triangles.reshape(-1, 3)),
             indices=wp.array(np.arange(3 * len(self.triangles), dtype=np.int32), dtype=int, device=device),
@@ -159,6 +156,13 @@ class Surface:
     def areas_of(triangles: np.ndarray) -> np.ndarray:
         """Areas of triangles, shape (n, 3, 3) [m]."""
         return 0.5 * np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+
+    @staticmethod
+    def normals_of(triangles: np.ndarray) -> np.ndarray:
+        """Unit normals of triangles, shape (n, 3, 3) [m]; zero where they have no area."""
+        cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        length = np.linalg.norm(cross, axis=1, keepdims=True)
+        return np.divide(cross, length, out=np.zeros_like(cross), where=length > 0.0)
 
     def shift(self, points: np.ndarray) -> wp.array:
         """Points in the frame and unit of the queries."""

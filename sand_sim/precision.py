@@ -19,6 +19,7 @@ class Precision:
     vec3: type
     vec4: type
     quat: type
+    mat33: type
     whole3: type
     whole4: type
     numpy_real: type
@@ -38,6 +39,7 @@ SINGLE = Precision(
     wp.vec3f,
     wp.vec4f,
     wp.quatf,
+    wp.mat33f,
     wp.vec3i,
     wp.vec4i,
     np.float32,
@@ -51,6 +53,7 @@ DOUBLE = Precision(
     wp.vec3d,
     wp.vec4d,
     wp.quatd,
+    wp.mat33d,
     wp.types.vector(3, wp.int64),
     wp.types.vector(4, wp.int64),
     np.float64,

@@ -61,9 +61,8 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
     leaves the domain is retired with all its spheres.
     """
     precision, verlet = recipe.precision, recipe.integrator == VERLET
-    mat33 = wp.types.matrix((3, 3), precision.real)
     real, whole, vec3, vec4 = precision.real, precision.whole, precision.vec3, precision.vec4
-    whole3, whole4 = precision.whole3, precision.whole4
+    whole3, whole4, mat33 = precision.whole3, precision.whole4, precision.mat33
     gather_body, fetch_grain = build_gather_body(precision), build_fetch_grain(recipe)
     fetch_felt, fetch_place = build_prefetch(vec3), build_prefetch(whole4)
 
@@ -201,8 +200,8 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
 def build_see_bodies(recipe: Recipe) -> wp.Kernel:
     """Kernel that completes the step of all bodies with the forces of now for lookers, as ``motion.build_complete_step``."""
     precision, verlet = recipe.precision, recipe.integrator == VERLET
-    mat33 = wp.types.matrix((3, 3), precision.real)
     real, whole, vec3, vec4, whole4 = precision.real, precision.whole, precision.vec3, precision.vec4, precision.whole4
+    mat33 = precision.mat33
     gather_body = build_gather_body(precision)
 
     @kernel

@@ -168,12 +168,11 @@ def test_a_leaky_body_is_refused():
 def test_contact_normals_lean_as_much_as_is_told(grain):
     box = trimesh.creation.box((0.1, 0.1, 0.02))
     body = sample_body(box, radius=0.003)
-    top = body.points[np.isclose(body.points[:, 2], 0.01)]
-    places = np.random.default_rng(0).uniform(-0.03, 0.03, (20000, 2))
-    nearest = distances(np.column_stack([places, np.full(len(places), 0.01)]), top)
+    places = np.random.default_rng(0).uniform(-0.05, 0.05, (20000, 2))
+    nearest = distances(np.column_stack([places, np.full(len(places), 0.01)]), body.points)
     lean = np.arcsin(nearest / (body.radius + grain))  # of a grain let down there until it touches
     assert lean.max() <= body.roughness(grain)
-    assert lean.max() >= 0.8 * body.roughness(grain)  # the widest place lies elsewhere
+    assert lean.max() >= 0.85 * body.roughness(grain)
 
 
 def test_inset_keeps_the_outer_size():
