@@ -5,6 +5,7 @@ import hashlib
 import os
 import time
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -75,13 +76,17 @@ def _keep(content: bytes | None, read: Callable[[], trimesh.Trimesh], options: d
 
 
 def _key(content: bytes, options: dict) -> str:
-    digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.read_bytes())
+    digest = hashlib.sha256(_code())
     shown = {name: value for name, value in options.items() if name not in ("progress", "observe") and value is not None}
     digest.update(repr(sorted(shown.items())).encode())
     digest.update(content)
     return digest.hexdigest()
+
+
+@cache
+def _code() -> bytes:
+    """The sampler's own source, as it is when first asked for."""
+    return b"".join(source.read_bytes() for source in sorted(Path(__file__).parent.glob("*.py")))
 
 
 def _sweep(folder: Path) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 import trimesh
@@ -68,8 +68,11 @@ class ToolModel:
         """Distance of world points, shape (n, 3), from its surface at the initial pose, shape (n,) [m]."""
         pose = self.tool.pose
         local = rotation.rotate(rotation.inverse(np.asarray(pose.orientation)), position - np.asarray(pose.position))
-        solid = self.mesh if self.surface is None else trimesh.Trimesh(**trimesh.triangles.to_kwargs(self.surface))
-        return SignedDistance(solid).query(local)[0] - self.margin
+        return self._solid.query(local)[0] - self.margin
+
+    @cached_property
+    def _solid(self) -> SignedDistance:
+        return SignedDistance(self.mesh if self.surface is None else trimesh.Trimesh(**trimesh.triangles.to_kwargs(self.surface)))
 
 
 def with_mesh(tool: Tool, mesh: str, scale: float) -> Tool:

@@ -27,7 +27,7 @@ from sand_sim.integrator import VERLET
 
 _ROOM_TO_SPARE = 1.1
 _FIRST_PAIRS = 3  # room for contacts per grain to begin with
-_FIRST_OTHERS = 0.125  # the same at walls and at tools
+_FACES = {"walls": 4, "tools": 2}  # the same: how many faces of a cube of grains they may lie at
 
 
 @dataclass(frozen=True)
@@ -116,15 +116,15 @@ class DemArrays:
         self.every_start.set(number + 1)
         self.met = SortedItems.allocate(number, 0, on)
 
-        few = max(int(_FIRST_OTHERS * number), 64)
+        face = int(number ** (2.0 / 3.0)) + 16
         self.pair_list = self._contact_list(_FIRST_PAIRS * number + 64)
         self.walls = wp.array(walls, dtype=Surface, device=device) if walls else None
-        self.wall_list = self._contact_list(few) if walls else None
+        self.wall_list = self._contact_list(_FACES["walls"] * face) if walls else None
         self.plungers = Plungers(list(drives), device) if drives else None
         self.plunger_states = self.plungers.states if drives else None
         farthest = float(table.radius.max()) + setting.listing_gap
         self.tools = Tools(bodies, farthest, precision, device) if bodies else None
-        self.tool_list = self._contact_list(few) if bodies else None
+        self.tool_list = self._contact_list(_FACES["tools"] * face) if bodies else None
         self.touch = self.old_touch = None
         self.grain_blocks = wp.zeros(energy.blocks_for(number), dtype=wp.vec3d, device=device)
         self.make_room()

@@ -119,6 +119,7 @@ def check_room(
     room: int,
     wanted: wp.array(dtype=int),
     proceed: wp.array(dtype=int),
+    stepping: wp.array(dtype=int),
     running: wp.array(dtype=int),
     fault: wp.array(dtype=int),
 ):
@@ -127,6 +128,7 @@ def check_room(
     wanted[0] = number
     if number > room:
         proceed[0] = 0
+        stepping[0] = 0
         running[0] = 0
         wp.atomic_or(fault, 0, wp.static(FAULT_ROOM))
 
@@ -177,10 +179,8 @@ def record_count(recorder, contacts: ContactList, grains: Count, counting, flags
     """Count the contacts of each grain with ``counting()``, a launch that writes ``contacts.counts``, and see that they fit."""
     counting()
     record_running_totals(recorder, contacts.counts, grains, contacts.totals, contacts.new_starts)
-    recorder.once(
-        check_room,
-        [contacts.new_starts, grains.spans, contacts.pairs.capacity, contacts.wanted, flags.proceed, flags.running, flags.fault],
-    )
+    steering = [flags.proceed, flags.stepping, flags.running, flags.fault]
+    recorder.once(check_room, [contacts.new_starts, grains.spans, contacts.pairs.capacity, contacts.wanted, *steering])
 
 
 def record_fill(recorder, contacts: ContactList, grain_starts: Count, filling) -> None:

@@ -44,9 +44,9 @@ class CudaRecorder:
         """Launch a single thread."""
         self._launch(launched, 1, inputs)
 
-    def when(self, flag: wp.array, body: Callable[[], None]) -> None:
-        """Run the body's launches only if ``flag[0]`` is not zero then."""
-        wp.capture_if(flag, on_true=body)
+    def when(self, flag: wp.array, body: Callable[[], None], otherwise: Callable[[], None] | None = None) -> None:
+        """Run the body's launches only if ``flag[0]`` is not zero then, and those of ``otherwise`` if it is."""
+        wp.capture_if(flag, on_true=body, on_false=otherwise)
 
     def repeat(self, flag: wp.array, body: Callable[[], None]) -> None:
         """Run the body's launches as long as ``flag[0]`` is not zero."""

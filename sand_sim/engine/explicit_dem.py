@@ -8,7 +8,7 @@ from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.energy import blocks_for
 from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_ROOM, FAULT_TOO_FAST
 from sand_sim.engine.measuring import record_measurement
-from sand_sim.engine.stages import choose_stages, record_renewal, record_run
+from sand_sim.engine.stages import choose_stages, record_run
 from sand_sim.engine.state import put_state, take_state
 from sand_sim.engine.survey import list_kernels
 
@@ -76,7 +76,7 @@ class ExplicitDem:
         left = self.arrays.flags.steps_left
         left.fill_(steps)
         while int(left.numpy()[0]) > 0:
-            self._play(record_run)
+            self._play(stepping=True)
 
     def begin(self) -> None:
         """Make this moment time zero: renew the lists and forget what has been counted and summed up."""
@@ -98,7 +98,7 @@ class ExplicitDem:
         """Make the contact lists anew where they are no longer valid, as the next step would."""
         flags = self.arrays.flags
         while int(flags.grains_moved.numpy()[0]) or int(flags.tools_moved.numpy()[0]):
-            self._play(record_renewal)
+            self._play(stepping=False)
 
     def remove(self, identities: np.ndarray) -> None:
         """Retire spheres by their identities, shape (n,); of a rigid body all must be given."""
@@ -148,12 +148,13 @@ class ExplicitDem:
         if put_state(self.arrays, state):
             self._programs.clear()
 
-    def _play(self, record) -> None:
-        """Play a program once; where a list had no room it has stopped early, and there is room when it is played again."""
+    def _play(self, stepping: bool) -> None:
+        """Renew the lists and step; where a list had no room this stops early, and there is room when it is played again."""
         flags = self.arrays.flags
         flags.running.fill_(1)
         flags.proceed.fill_(1)
-        self._program(record)()
+        flags.stepping.fill_(int(stepping))
+        self._program(record_run)()
         fault = int(flags.fault.numpy()[0])
         flags.fault.zero_()
         if fault & (FAULT_NOT_FINITE | FAULT_TOO_FAST):

@@ -13,7 +13,8 @@ class Flags:
 
     Attributes:
         running: the frame's loop goes on.
-        proceed: the contact lists are complete, so forces may be computed.
+        proceed: there was room for all contacts so far, so lists may be filled.
+        stepping: once the lists are complete a step follows, else the loop ends.
         grains_moved: some grain may have met a neighbour that is not on its list.
         tools_moved: the same for tools.
         fault: bits FAULT_*.
@@ -23,6 +24,6 @@ class Flags:
     """
 
     def __init__(self, device: str):
-        for name in ("running", "proceed", "grains_moved", "tools_moved", "fault", "starting", "steps_left"):
+        for name in ("running", "proceed", "stepping", "grains_moved", "tools_moved", "fault", "starting", "steps_left"):
             setattr(self, name, wp.zeros(1, dtype=int, device=device))
         self.steps_done = wp.zeros(1, dtype=wp.int64, device=device)

@@ -79,22 +79,20 @@ def record_lists(arrays: DemArrays, stages: Stages, recorder) -> None:
 
 
 def record_run(arrays: DemArrays, stages: Stages, recorder) -> None:
-    """Record the loop over steps: renew the lists where needed, then step, until ``flags.running`` falls."""
+    """Record the loop over steps: renew the lists where needed, then step, until ``flags.running`` falls.
+
+    Without ``flags.stepping`` it renews the lists alone.
+    """
+    flags = arrays.flags
 
     def one_step():
         record_lists(arrays, stages, recorder)
-        recorder.when(arrays.flags.proceed, partial(_play, arrays, stages.step, recorder))
+        step, end = partial(_play, arrays, stages.step, recorder), partial(recorder.once, finish.lower_flag, [flags.running])
+        recorder.when(flags.stepping, step, end)
 
     if arrays.tools:
         place_tools(arrays, recorder)
-    recorder.repeat(arrays.flags.running, one_step)
-
-
-def record_renewal(arrays: DemArrays, stages: Stages, recorder) -> None:
-    """Record the renewal of the lists alone."""
-    if arrays.tools:
-        place_tools(arrays, recorder)
-    record_lists(arrays, stages, recorder)
+    recorder.repeat(flags.running, one_step)
 
 
 def sort_stage(arrays: DemArrays, recorder) -> None:

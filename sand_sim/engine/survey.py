@@ -34,9 +34,11 @@ class Survey:
         """Note a launch of a single thread."""
         self._note(launched, inputs)
 
-    def when(self, flag: wp.array, body: Callable[[], None]) -> None:
-        """Note what the body launches."""
+    def when(self, flag: wp.array, body: Callable[[], None], otherwise: Callable[[], None] | None = None) -> None:
+        """Note what the bodies launch."""
         body()
+        if otherwise:
+            otherwise()
 
     repeat = when
 
