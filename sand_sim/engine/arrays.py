@@ -10,6 +10,7 @@ from sand_sim.engine import energy, tool_contacts
 from sand_sim.engine.bodies import Bodies
 from sand_sim.engine.borrowing import Lender
 from sand_sim.engine.cells import prepare_cells
+from sand_sim.engine.chunks import CHUNK
 from sand_sim.engine.contact_list import ContactList
 from sand_sim.engine.count import Count
 from sand_sim.engine.flags import Flags
@@ -157,9 +158,9 @@ class DemArrays:
         filling = Lender(pairs.couple and pairs.couple[:room], self.device)
         counts, old_starts, met_cursor = (filling.lend(int, number + 1) for _ in range(3))
         self.met = replace(self.met, cursor=met_cursor)
+        self.hits = filling.lend(int, HITS * number + CHUNK * self.on.lanes)
         for contacts in self.lists.values():
             contacts.counts, contacts.old_starts, contacts.new_starts = counts, old_starts, filling.lend(int, number + 1)
-        self.hits = filling.lend(int, HITS * number)
         self.energy_blocks = {
             name: wp.zeros(energy.blocks_for(c.pairs.capacity), dtype=wp.vec2d, device=self.device)
             for name, c in self.lists.items()

@@ -7,6 +7,7 @@ import warp as wp
 from sand_sim.contact.response import memory_type
 from sand_sim.engine.act import build_swapped
 from sand_sim.engine.cells import cell_functions, level_type
+from sand_sim.engine.chunks import build_find_near, build_note_hits
 from sand_sim.engine.contact_list import listed_at
 from sand_sim.engine.count import count_of, share_out
 from sand_sim.engine.kernel import kernel, sure
@@ -16,15 +17,21 @@ HITS = 6  # a sphere's partners that the counting search notes for the filling o
 
 
 @wp.func
-def of_one_body(member: wp.array(dtype=int), body_of: wp.array(dtype=int), i: int, j: int) -> bool:
-    """Whether two spheres belong to the same rigid body."""
-    of_i = int(-1)
+def of_other_bodies(near: int, base: int, member: wp.array(dtype=int), body_of: wp.array(dtype=int), i: int) -> int:
+    """The bits of those spheres of a chunk that do not belong to the rigid body of sphere i."""
+    own = int(-1)
     if member[i] >= 0:
-        of_i = body_of[member[i]]
-    of_j = int(-2)
-    if member[j] >= 0:
-        of_j = body_of[member[j]]
-    return of_i == of_j
+        own = body_of[member[i]]
+    kept = near
+    k = int(0)
+    while kept >> k != 0:
+        if (kept >> k) & 1 != 0:
+            j = sure(base + k)
+            if own >= 0 and member[j] >= 0:
+                if body_of[member[j]] == own:
+                    kept -= 1 << k
+        k += 1
+    return kept
 
 
 @cache
@@ -65,18 +72,24 @@ def build_list_pair(recipe: Recipe) -> wp.Function:
 
 
 @cache
-def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
+def build_search(recipe: Recipe, filling: bool, chunk: int) -> wp.Kernel:
     """Kernel that visits each pair of spheres closer than touch plus skin, once, from the sphere that comes first.
 
     Spheres are numbered in the order of their cells, level by level from fine to coarse. A sphere looks at what follows in its
     own level and at all cells around it in coarser levels. The first pass counts and notes what it finds; the second, the
     ``filling``, writes the list and searches again only for spheres of which not all was noted.
+
+    A row of three cells holds a few spheres, one after the other. Their distances are measured ``chunk`` at a time, some in vain,
+    so that a core can do them all at once and need not guess how many there are. There must be at least so many spheres, because
+    no chunk reads beyond the last; and one thread must take the spheres of a lane in order, because notes spill over into the
+    room of the next sphere. A chunk of one asks for neither.
     """
     precision, bodies = recipe.precision, recipe.bodies
     real, whole, whole3, whole4 = precision.real, precision.whole, precision.whole3, precision.whole4
     memory_vector, list_pair = memory_type(recipe.contact, precision), build_list_pair(recipe)
     level = level_type(precision)
     level_of, cell_of = cell_functions(precision)
+    find_near, note_hits = build_find_near(precision, chunk), build_note_hits(chunk)
 
     @kernel
     def search(
@@ -102,56 +115,59 @@ def build_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         old_partner: wp.array(dtype=int),
         old_memory: wp.array(dtype=memory_vector),
     ):
+        spheres = place.shape[0]
         for item in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
             i = sure(item)
             here = place[i]
             low = lowest[0]
             gap = real(here[3] + allowed[i]) + across
+            noted = sure(wp.static(HITS) * i + lane * wp.static(chunk))
             found = int(0)
             if wp.static(filling):
                 found = starts[i]
                 number = starts[sure(i + 1)] - found
                 if number < wp.static(HITS):
                     for k in range(number):
-                        j = sure(hits[sure(wp.static(HITS) * i + k)])
+                        j = sure(hits[sure(noted + k)])
                         list_pair(sure(found + k), i, j, owner, partner, memory, came_from, old_starts, old_partner, old_memory)
                     continue
             own = level_of(levels, here[3])
-            for k in range(own, levels.shape[0]):
-                one = levels[k]
+            for tier in range(own, levels.shape[0]):
+                one = levels[tier]
                 cell = cell_of(one, low, here)
                 left = wp.max(cell[0] - 1, 0)
                 right = wp.min(cell[0] + 1, one.nx - 1)
-                for row in range(9):
+                rows = 9  # in the counting search one loop each, whose branches are easier to guess
+                if wp.static(filling):
+                    rows = int(9)
+                for row in range(rows):
                     y = cell[1] + row % 3 - 1
                     z = cell[2] + row // 3 - 1
-                    behind = k == own and row < 4
+                    behind = tier == own and row < 4
                     if behind or y < 0 or y >= one.ny or z < 0 or z >= one.nz:
                         continue
                     line = sure(one.first_key + (z * one.ny + y) * one.nx)
                     first = cell_starts[sure(line + left)]
-                    if k == own and row == 4:
+                    if tier == own and row == 4:
                         first = i + 1
-                    for other in range(first, cell_starts[sure(line + right + 1)]):
-                        j = sure(other)
-                        there = place[j]
-                        dx = real(here[0] - there[0])
-                        dy = real(here[1] - there[1])
-                        dz = real(here[2] - there[2])
-                        reach = real(there[3] + allowed[j]) + gap
-                        within = dx * dx + dy * dy + dz * dz < reach * reach
+                    last = cell_starts[sure(line + right + 1)]
+                    for begin in range(first, last, wp.static(chunk)):
+                        base = wp.min(begin, spheres - wp.static(chunk))
+                        near = find_near(place, allowed, base, begin, last, here, gap)
                         if wp.static(bodies):
-                            if within:
-                                within = not of_one_body(member, body_of, i, j)
+                            near = of_other_bodies(near, base, member, body_of, i)
                         if wp.static(filling):
-                            if within:
-                                at = sure(found)
-                                list_pair(at, i, j, owner, partner, memory, came_from, old_starts, old_partner, old_memory)
-                                found += 1
+                            k = int(0)
+                            while near >> k != 0:
+                                if (near >> k) & 1 != 0:
+                                    at = sure(found)
+                                    j = sure(base + k)
+                                    list_pair(at, i, j, owner, partner, memory, came_from, old_starts, old_partner, old_memory)
+                                    found += 1
+                                k += 1
                         else:
-                            # All are noted and partners kept by counting on, which spares a branch that nobody can guess.
-                            hits[sure(wp.static(HITS) * i + wp.min(found, wp.static(HITS - 1)))] = j
-                            found += wp.where(within, 1, 0)
+                            note_hits(hits, sure(noted + wp.min(found, wp.static(HITS - 1))), base, near)
+                            found += wp.bit_count(near)
             if wp.static(not filling):
                 counts[i] = found
 

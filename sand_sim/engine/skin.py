@@ -14,7 +14,7 @@ from sand_sim.engine.count import count_of
 from sand_sim.engine.kernel import kernel, sure
 from sand_sim.precision import Precision
 
-_SEARCH = 3.0  # measured: benchmarks/profile.py says 4.6; lists seldom last as long as they should, so that less is better
+_SEARCH = 2.4  # measured: benchmarks/profile.py says 3.5; lists seldom last as long as they should, so that less is better
 _SPARE = 1.5  # a grain may go this many times as far as it would at its last pace
 _LEAST, _FIRST = 0.1, 0.4  # of the widest allowance, of grains at rest and in the first lists
 _FIRST_LIFETIME = 50.0  # steps, while nothing is known of the motion

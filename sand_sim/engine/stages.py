@@ -19,6 +19,7 @@ from sand_sim.engine import (
 )
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_lay_cells
+from sand_sim.engine.chunks import CHUNK
 from sand_sim.engine.contact_list import ContactList, record_count, record_fill
 from sand_sim.engine.skin import begin_lifetime, build_allow, build_remember, build_set_pace, end_lifetime
 from sand_sim.engine.smooth_tools import arguments_of, record_carrying, record_keeping, record_touching
@@ -117,12 +118,13 @@ def list_stage(arrays: DemArrays, recorder) -> None:
     grains, flags, cells = arrays.grains, arrays.flags, arrays.cells
     active, skin, across = grains.active, arrays.skin, arrays.setting.reach / arrays.lattice.quantum
     precision = arrays.recipe.precision
+    chunk = 1 if recorder.wide or grains.capacity < CHUNK else CHUNK
 
     def pairs(filling):
         inputs = [grains.place, cells.levels, cells.low, arrays.in_cells.starts, arrays.allowed, across]
         inputs += [grains.member, arrays.bodies.body_of if arrays.bodies else None, arrays.hits]
         inputs += _list_arguments(arrays, arrays.pair_list)
-        recorder.each(neighbours.build_search(arrays.recipe, filling), active, inputs)
+        recorder.each(neighbours.build_search(arrays.recipe, filling, chunk), active, inputs)
 
     def walls(filling):
         inputs = [grains.place, arrays.walls, arrays.plunger_states, skin.widest, across]

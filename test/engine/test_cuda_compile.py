@@ -1,7 +1,7 @@
 """Kernels compile for NVIDIA GPUs. That needs no GPU: the compiler comes with Warp."""
 
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import pytest
@@ -72,7 +72,7 @@ RECIPES |= {
 def kernels_of(one):
     """Kernels that depend on the recipe."""
     forces = (pair_forces.build_pair_forces, surface_contacts.build_surface_forces, tool_contacts.build_tool_forces)
-    searches = (neighbours.build_search, surface_contacts.build_surface_search, tool_contacts.build_tool_search)
+    searches = (partial(neighbours.build_search, chunk=1), surface_contacts.build_surface_search, tool_contacts.build_tool_search)
     made = [build(one, second) for build in (*forces, *searches) for second in (False, True)]
     made += [motion.build_move_grains(one, True, True), energy.build_grain_energy(one), tool_contacts.build_wrench_blocks(one)]
     made += [plungers.build_plunger_blocks(one), energy.build_contact_energy(one.precision)]

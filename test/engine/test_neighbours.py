@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scenes import floor
 
+from sand_sim.engine.chunks import CHUNK
+
 
 def cloud(number, radius, edge, seed):
     """Grains strewn at random, overlapping as it comes."""
@@ -40,6 +42,14 @@ def test_every_pair_within_reach_is_listed_once(make_world, sizes, threads):
     assert len(found) == number
     assert {tuple(pair) for pair in np.column_stack([a, b])} <= {tuple(pair) for pair in found}
     assert possible[found[:, 0], found[:, 1]].all()
+
+
+@pytest.mark.parametrize("number", [CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK])
+def test_all_of_a_few_are_listed(make_world, number):
+    """As many grains as are looked at at once, fewer and more, all within reach of each other."""
+    position, radius = cloud(number, SIZES["one size"], 0.003, seed=7)
+    world = make_world(position, radius, skin=1e-3, precision="single", contact={"tangential": "none"})
+    assert [len(listed_pairs(world)[0]), listed_pairs(world)[1]] == [number * (number - 1) // 2] * 2
 
 
 def test_lists_grow_and_nothing_is_dropped(make_world):
