@@ -1,5 +1,6 @@
 """Publishers, subscriptions, services, actions and timers of a configured node, which come and go together."""
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,8 @@ from rclpy.publisher import Publisher
 from sand_sim.node.quality import overridable, usual_quality, warn_of_publisher, warn_of_subscriber
 
 COMMANDS_DEPTH = 100
+_RESTS, _LONGEST_REST = 8.0, 0.005  # after messages came in: times the processor time that took, and at most [s]
+_MANY = 8  # messages that came in at once, after which there is no time to rest
 
 
 class Connections:
@@ -20,10 +23,11 @@ class Connections:
 
     Args:
         node: they belong to.
+        in_haste: tells whether each message must be heard at once.
     """
 
-    def __init__(self, node: Node):
-        self._node = node
+    def __init__(self, node: Node, in_haste: Callable[[], bool]):
+        self._node, self._in_haste, self._spent = node, in_haste, time.thread_time()
         self._undo: list[Callable[[], Any]] = []
         self._waiting = ReentrantCallbackGroup()  # in the usual group one that waits would keep all others from being heard
 
@@ -45,12 +49,16 @@ class Connections:
         def hear_all(message: Any) -> None:
             hear(message)
             # What else has come in is taken at once: the executor needs ten times as long to bring one message.
-            for _ in range(COMMANDS_DEPTH):
+            heard = 1
+            while heard <= COMMANDS_DEPTH:
                 with made.handle:
                     taken = made.handle.take_message(kind, False)
                 if taken is None:
                     break
                 hear(taken[0])
+                heard += 1
+            if heard < _MANY:
+                self._rest()
 
         made = self._made(
             self._node.create_subscription,
@@ -81,6 +89,13 @@ class Connections:
         """Destroy all of them."""
         while self._undo:
             self._undo.pop()()
+
+    def _rest(self) -> None:
+        """Let messages gather, so that bringing a few takes no more than a ninth of a core from the threads that step."""
+        if not self._in_haste():
+            spent = max(0.0, time.thread_time() - self._spent)  # the thread need not be the one that made the connections
+            time.sleep(min(_RESTS * spent, _LONGEST_REST))
+        self._spent = time.thread_time()
 
     def _made(self, create: Callable, kind: type, topic: str, *further, **options) -> Any:
         try:

@@ -209,7 +209,8 @@ class SandSimNode(LifecycleNode):
         return folder
 
     def _connect(self, world: World, frames: list[Frame]) -> None:
-        connections, parameters = Connections(self), self.parameters
+        connections = Connections(self, in_haste=lambda: self.simulation.pacing == "lockstep")
+        parameters = self.parameters
         self._endings.callback(connections.close)
         self._clock_publisher = connections.publisher(Clock, "/clock") if parameters["publish_clock"] else None
         self._diagnostics = connections.publisher(DiagnosticArray, "/diagnostics")
