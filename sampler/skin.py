@@ -4,11 +4,14 @@ import numpy as np
 
 from sampler.crossing import count_layers, crossing_planes, cut_triangles
 from sampler.surface import Surface
+from sampler.topology import link_items
 
 _STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what is there
 _TRIAL = 4000  # random places that show whether anything is buried at all
 _DEEPEST = 400  # cuts through one triangle
 _ISLAND = 1.5  # triangles longer than this are halved, others cut along the planes that cross them; in spacings
+_NARROW = 1e-7  # of the diagonal: narrower triangles have no normal in single precision
+_SPECK = 0.01  # area of a speck, in squared spacings
 _MOST, _FINEST = 10, 0.5  # cuts per particle to come, after which only triangles longer than so many spacings are cut
 
 
@@ -82,6 +85,39 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
     pieces, parents = np.concatenate(pieces), np.concatenate(parents)
     free, layers = _ask(pieces.mean(axis=1), Surface.normals_of(pieces), around)
     return pieces[free], parents[free], layers[free]
+
+
+def without_specks(triangles: np.ndarray, around: Surface, spacing: float) -> np.ndarray:
+    """Free triangles that particles are to cover, shape (m, 3, 3) [m], of all, shape (n, 3, 3) [m].
+
+    Left out are triangles too narrow to have a normal; folds, on which more of the closed surfaces face the other way, so that
+    those are the skin there; and specks, such as pinholes between parts, alone farther than a spacing from all the rest.
+    """
+    edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+    sound = 2.0 * Surface.areas_of(triangles) > _NARROW * around.unit * edge
+    triangles = triangles[sound]
+    layers = count_layers(triangles.mean(axis=1), Surface.normals_of(triangles), around, _STEP * around.unit)
+    triangles = triangles[layers >= 0]
+    island = _islands(triangles, 0.25 * spacing)
+    speck = np.bincount(island, Surface.areas_of(triangles))[island] < _SPECK * spacing**2
+    speck &= edge[sound][layers >= 0] < 0.25 * spacing
+    if speck.any() and not speck.all():
+        middle = triangles[speck].mean(axis=1)
+        speck[speck] = np.linalg.norm(Surface(triangles[~speck]).closest(middle)[0] - middle, axis=1) > spacing
+    return triangles[~speck] if not speck.all() else triangles
+
+
+def _islands(triangles: np.ndarray, cell: float) -> np.ndarray:
+    """Numbers, alike for triangles whose middles lie in the same cube of a grid or in neighbouring ones, shape (n,)."""
+    place = np.floor(triangles.mean(axis=1) / cell).astype(np.int64)
+    place -= place.min(axis=0) - 1
+    size = place.max(axis=0) + 2
+    key, inverse = np.unique(np.ravel_multi_index(place.T, size), return_inverse=True)
+    steps = np.indices((3, 3, 3)).reshape(3, -1).T[14:] - 1  # half of the neighbours; the others are theirs
+    beside = key[:, None] + steps @ [size[1] * size[2], size[2], 1]
+    found = np.minimum(np.searchsorted(key, beside), len(key) - 1)
+    here, which = np.nonzero(key[found] == beside)
+    return link_items(len(key), here, found[here, which])[0][inverse]
 
 
 def winding_before(points: np.ndarray, normals: np.ndarray, around: Surface) -> np.ndarray:
