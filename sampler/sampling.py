@@ -12,7 +12,7 @@ from sampler.inset import inset_particles
 from sampler.mass import integrate, is_physical
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
 from sampler.sheets import closed_triangles
-from sampler.skin import Skin, free_triangles, winding_before, without_specks
+from sampler.skin import Skin, free_triangles, touchable_parts, winding_before
 from sampler.spreading import Observer, lattice_spacing, measure_evenness, particle_count, spread_particles
 from sampler.surface import Surface
 
@@ -25,7 +25,6 @@ _TRIES, _FINER = 4, 0.92
 _WALL_SAMPLES = 4000
 _OUTWARD = 1e-5  # of the diagonal
 _ASIDE = (0.01, 0.03, 0.1, 0.3)  # ways out of the crease between two parts that are tried, in spacings
-_INWARD = 0.9  # share of the way to the middle of a piece that is gone at most, so that no two meet there
 
 Progress = Callable[[float], None]
 
@@ -89,7 +88,7 @@ def sample_body(
             free = np.concatenate([free_triangles(solid.triangles, solid, fine)[0], sheet])
     if not len(free):
         raise MeshError("mesh: no part of its surface has an outside; check its orientation")
-    skin = Skin(without_specks(free, around if solid is None else solid, fine), device)
+    skin = Skin(touchable_parts(free, solid, fine), device)
     area = float(skin.areas.sum())
     for attempt in range(_TRIES):
         number = count if count is not None else particle_count(area, fine)
@@ -134,24 +133,25 @@ def sample_body(
 def _clear_creases(
     points: np.ndarray, normals: np.ndarray, skin: Skin, solid: Surface, spacing: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Take particles that look into the solid, in creases between parts and ends of slits, towards the middle of their piece.
+    """Take particles that look into the solid, in creases between parts and ends of slits, the way to the middle of their piece.
 
     Pieces were asked there whether they are free.
     """
     _, face = skin.closest(points, up=normals)
     way = skin.triangles[face].mean(axis=1) - points
-    length = np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
-    before = points - _OUTWARD * solid.unit * way / length  # so that none counts as free that lies in the other wall itself
-    buried = np.flatnonzero(np.abs(winding_before(before, normals, solid)) > 0.5)
-    points, normals = points.copy(), normals.copy()
-    begin, up, way, length = points[buried], skin.normals[face[buried]], way[buried], length[buried]
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
+    outward = points - _OUTWARD * solid.unit * way  # so that none counts as free that lies in the other wall itself
+    buried = np.flatnonzero(np.abs(winding_before(outward, normals, solid)) > 0.5)
+    points = points.copy()
+    begin = points[buried]
     for share in _ASIDE:
         if not len(buried):
             break
-        there = begin + way * np.minimum(_INWARD, share * spacing / length)
-        free = np.abs(winding_before(there, up, solid)) < 0.5
-        points[buried[free]], normals[buried[free]] = there[free], up[free]
-        buried, begin, up, way, length = (values[~free] for values in (buried, begin, up, way, length))
+        there, face = skin.closest(begin + share * spacing * way[buried], up=normals[buried])
+        same = np.einsum("ij,ij->i", skin.normals[face], normals[buried]) > 0.9  # not over to the other part
+        free = same & (np.abs(winding_before(there, normals[buried], solid)) < 0.5)
+        points[buried[free]] = there[free]
+        buried, begin = buried[~free], begin[~free]
     return points, normals
 
 

@@ -11,6 +11,9 @@ _TRIAL = 4000  # random places that show whether anything is buried at all
 _DEEPEST = 400  # cuts through one triangle
 _ISLAND = 1.5  # triangles longer than this are halved, others cut along the planes that cross them; in spacings
 _NARROW = 1e-7  # of the diagonal: narrower triangles have no normal in single precision
+_THIRDS = (np.ones((3, 3)) + 3.0 * np.eye(3)) / 6.0  # places of a triangle, the middles of parts of it
+_MIDDLE = np.array([[0.36, 0.34, 0.3], [0.31, 0.36, 0.33]])  # near its middle, but hardly on edges of others
+_SLIT = 0.1  # longest edge of the pieces that slits are cut into, in spacings
 _SPECK = 0.01  # area of a speck, in squared spacings
 _MOST, _FINEST = 10, 0.5  # cuts per particle to come, after which only triangles longer than so many spacings are cut
 
@@ -87,24 +90,56 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
     return pieces[free], parents[free], layers[free]
 
 
-def without_specks(triangles: np.ndarray, around: Surface, spacing: float) -> np.ndarray:
-    """Free triangles that particles are to cover, shape (m, 3, 3) [m], of all, shape (n, 3, 3) [m].
+def touchable_parts(triangles: np.ndarray, solid: Surface | None, spacing: float) -> np.ndarray:
+    """Parts of free triangles, shape (n, 3, 3) [m], that particles are to cover, shape (m, 3, 3) [m].
 
-    Left out are triangles too narrow to have a normal; folds, on which more of the closed surfaces face the other way, so that
-    those are the skin there; and specks, such as pinholes between parts, alone farther than a spacing from all the rest.
+    Left out are triangles too narrow to have a normal; folds, on which more of the solid's faces look the other way, so that those
+    are the skin there; the ends of slits; and specks, such as pinholes between parts, alone farther than a spacing from the rest.
     """
-    edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
-    sound = 2.0 * Surface.areas_of(triangles) > _NARROW * around.unit * edge
-    triangles = triangles[sound]
-    layers = count_layers(triangles.mean(axis=1), Surface.normals_of(triangles), around, _STEP * around.unit)
-    triangles = triangles[layers >= 0]
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    narrow = _NARROW * np.linalg.norm(high - low) * _longest_edges(triangles)
+    triangles = triangles[2.0 * Surface.areas_of(triangles) > narrow]
+    if solid is not None:
+        triangles = _outside_slits(np.delete(triangles, _folds(triangles, solid), axis=0), solid, spacing)
     island = _islands(triangles, 0.25 * spacing)
     speck = np.bincount(island, Surface.areas_of(triangles))[island] < _SPECK * spacing**2
-    speck &= edge[sound][layers >= 0] < 0.25 * spacing
+    speck &= _longest_edges(triangles) < 0.25 * spacing
     if speck.any() and not speck.all():
         middle = triangles[speck].mean(axis=1)
         speck[speck] = np.linalg.norm(Surface(triangles[~speck]).closest(middle)[0] - middle, axis=1) > spacing
-    return triangles[~speck] if not speck.all() else triangles
+        triangles = triangles[~speck]
+    return triangles
+
+
+def _longest_edges(triangles: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+
+
+def _folds(triangles: np.ndarray, solid: Surface) -> np.ndarray:
+    """Numbers of triangles on which more faces look the other way than theirs."""
+    fold, normals = np.arange(len(triangles)), Surface.normals_of(triangles)
+    for weight in _MIDDLE:
+        places = np.einsum("nij,i->nj", triangles[fold], weight)
+        fold = fold[count_layers(places, normals[fold], solid, _STEP * solid.unit) < 0]
+    return fold
+
+
+def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.ndarray:
+    """Triangles without those parts before which there is no room; slits that narrow do not end where a plane could cut."""
+    places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
+    if np.all(np.abs(winding_before(places, normals, solid)) < 0.5):
+        return triangles
+    kept, first = [], True
+    while len(triangles):
+        large = _longest_edges(triangles) > _SLIT * spacing
+        kept.append(triangles[~large])
+        triangles = triangles[large]
+        places = np.einsum("nij,ki->nkj", triangles, _THIRDS).reshape(-1, 3)
+        before = winding_before(places, np.repeat(Surface.normals_of(triangles), 3, axis=0), solid)
+        shut = (np.abs(before) > 0.5).reshape(-1, 3).sum(axis=1)
+        kept.append(triangles[(shut == 0) | (first & (shut == 3))])  # those were judged free all the same
+        triangles, first = _halve(triangles[(shut > 0) & (shut < 3)]), False
+    return np.concatenate(kept)
 
 
 def _islands(triangles: np.ndarray, cell: float) -> np.ndarray:
