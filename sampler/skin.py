@@ -23,8 +23,7 @@ class Skin(Surface):
 
     def places(self, number: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         """Random places, so many over the area and as many over the longest edges, so that narrow strips get their share."""
-        length = np.linalg.norm(self.triangles - np.roll(self.triangles, -1, axis=1), axis=2).max(axis=1)
-        both = self.sample(number, random), self.sample(number, random, length)
+        both = self.sample(number, random), self.sample(number, random, _longest_edges(self.triangles))
         return tuple(np.concatenate(pair) for pair in zip(*both, strict=True))
 
     def sample(self, number: int, random: np.random.Generator, weight: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -67,7 +66,7 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
     most = len(triangles) // 2 + _MOST * float(Surface.areas_of(triangles).sum()) / spacing**2
     pieces, parents, cuts = [], [], 0
     for _ in range(_DEEPEST):
-        edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+        edge = _longest_edges(triangles)
         worth = np.flatnonzero(edge > (0.0 if cuts < most else _FINEST * spacing))
         crossed, normals, places = crossing_planes(triangles[worth], around, _STEP * around.unit)
         crossed = worth[crossed]
@@ -93,8 +92,8 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
 def touchable_parts(triangles: np.ndarray, solid: Surface | None, spacing: float) -> np.ndarray:
     """Parts of free triangles, shape (n, 3, 3) [m], that particles are to cover, shape (m, 3, 3) [m].
 
-    Left out are triangles too narrow to have a normal; folds, on which more of the solid's faces look the other way, so that those
-    are the skin there; the ends of slits; and specks, such as pinholes between parts, alone farther than a spacing from the rest.
+    Left out are triangles too narrow to have a normal; folds, on which more of the solid's faces look the other way, so that
+    those are the skin there; the ends of slits; and specks, such as pinholes between parts, farther than a spacing from the rest.
     """
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     narrow = _NARROW * np.linalg.norm(high - low) * _longest_edges(triangles)
@@ -129,17 +128,23 @@ def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
     if np.all(np.abs(winding_before(places, normals, solid)) < 0.5):
         return triangles
-    kept, first = [], True
+    large = _longest_edges(triangles) > _SLIT * spacing
+    kept, triangles, first = [triangles[~large]], triangles[large], True
     while len(triangles):
+        free = _room(triangles, _THIRDS, solid).sum(axis=1)
+        kept.append(triangles[(free == 3) | (first & (free == 0))])  # the latter were judged free all the same
+        triangles, first = _halve(triangles[(free > 0) & (free < 3)]), False
         large = _longest_edges(triangles) > _SLIT * spacing
-        kept.append(triangles[~large])
-        triangles = triangles[large]
-        places = np.einsum("nij,ki->nkj", triangles, _THIRDS).reshape(-1, 3)
-        before = winding_before(places, np.repeat(Surface.normals_of(triangles), 3, axis=0), solid)
-        shut = (np.abs(before) > 0.5).reshape(-1, 3).sum(axis=1)
-        kept.append(triangles[(shut == 0) | (first & (shut == 3))])  # those were judged free all the same
-        triangles, first = _halve(triangles[(shut > 0) & (shut < 3)]), False
+        small, triangles = triangles[~large], triangles[large]
+        kept.append(small[_room(small, np.full((1, 3), 1.0 / 3.0), solid)[:, 0]])
     return np.concatenate(kept)
+
+
+def _room(triangles: np.ndarray, weights: np.ndarray, solid: Surface) -> np.ndarray:
+    """Whether there is room before places of triangles, given by the weights, shape (k, 3), of their corners; shape (n, k)."""
+    places = np.einsum("nij,ki->nkj", triangles, weights).reshape(-1, 3)
+    before = winding_before(places, np.repeat(Surface.normals_of(triangles), len(weights), axis=0), solid)
+    return (np.abs(before) < 0.5).reshape(-1, len(weights))
 
 
 def _islands(triangles: np.ndarray, cell: float) -> np.ndarray:
