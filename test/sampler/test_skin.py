@@ -6,7 +6,8 @@ import trimesh
 from shapes import solid_angle_inside
 
 from sampler.mass import integrate
-from sampler.skin import free_triangles, touchable_parts, winding_before
+from sampler.skin import Skin, free_triangles, touchable_parts, winding_before
+from sampler.spreading import spread_particles
 from sampler.surface import Surface
 
 
@@ -125,3 +126,15 @@ def test_the_end_of_a_slit_is_no_skin():
     assert lost == pytest.approx(2 * 0.8 * step * solid.unit / slope, rel=0.05)
     middle = kept.mean(axis=1)
     assert np.mean(np.abs(winding_before(middle, Surface.normals_of(kept), solid)) > 0.5) < 0.02
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_small_pieces_that_face_the_other_way_are_found(seed):
+    grid = np.stack(np.meshgrid(np.arange(20), np.arange(20), [0]), -1).reshape(-1, 1, 3)
+    plate = np.concatenate([grid + half for half in ([[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]])]) / 20
+    flag = np.array([[0.0, 0.5, -0.02], [0.0, 0.503, -0.02], [0.003, 0.5, -0.02]])  # faces down, a few of all places fall on it
+    flags = flag + np.linspace([0.1, 0, 0], [0.9, 0, 0], 12)[:, None]
+    points, normals = spread_particles(Skin(np.concatenate([plate, flags])), 400, seed)
+    below = points[normals[:, 2] < 0.0]
+    away = np.linalg.norm(flags.mean(axis=1)[:, None] - below, axis=2).min(axis=1)
+    assert away.max() < np.sqrt(2.0 / np.sqrt(3.0) / 400)
