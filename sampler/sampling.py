@@ -12,7 +12,7 @@ from sampler.inset import inset_particles
 from sampler.mass import integrate, is_physical
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
 from sampler.sheets import closed_triangles
-from sampler.skin import Skin, free_triangles, winding_before
+from sampler.skin import Skin, free_triangles, touchable_parts, winding_before
 from sampler.spreading import Observer, lattice_spacing, measure_evenness, particle_count, spread_particles
 from sampler.surface import Surface
 
@@ -23,7 +23,8 @@ _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest 
 _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
 _WALL_SAMPLES = 4000
-_ASIDE = (0.01, 0.03, 0.09)  # ways from the crease between two parts that are tried, in spacings
+_OUTWARD = 1e-5  # of the diagonal
+_ASIDE = (0.01, 0.03, 0.1, 0.3)  # ways out of the crease between two parts that are tried, in spacings
 
 Progress = Callable[[float], None]
 
@@ -74,21 +75,20 @@ def sample_body(
     fine = _spacing(radius, spacing, count, grain, rough)
     around = Surface(closed, device)
     free, parent, layers = free_triangles(closed, around, fine)
-    solid, cut = around, not np.array_equal(np.unique(parent, return_counts=True)[1], np.ones(len(free)))
+    solid = around
     warnings = list(repaired.report.warnings)
     volume, centre, inertia = _mass(closed, free, parent, layers, around, warnings)
     if thickness <= 2.0 * radius and np.any(owner == SHEET):
         # One layer in the sheets; the skin of the solids ends only where it is buried in other solids.
         free = repaired.triangles[repaired.kind == SHEET]
-        cut = np.any(owner != SHEET)
-        if cut:
+        solid = None
+        if np.any(owner != SHEET):
             solid = Surface(closed[owner != SHEET], device)
             sheet = free_triangles(free, solid, fine)[0]
             free = np.concatenate([free_triangles(solid.triangles, solid, fine)[0], sheet])
-        free = free[Surface.areas_of(free) > 0.0]
     if not len(free):
         raise MeshError("mesh: no part of its surface has an outside; check its orientation")
-    skin = Skin(free, device)
+    skin = Skin(touchable_parts(free, solid, fine), device)
     area = float(skin.areas.sum())
     for attempt in range(_TRIES):
         number = count if count is not None else particle_count(area, fine)
@@ -98,7 +98,7 @@ def sample_body(
                 "check the mesh's scale, or take larger particles"
             )
         h = lattice_spacing(area, number)
-        settle = partial(_clear_creases, skin=skin, solid=solid, spacing=h) if cut else lambda *placed: placed
+        settle = partial(_clear_creases, skin=skin, solid=solid, spacing=h) if solid else lambda *placed: placed
         points, normals = spread_particles(skin, number, seed, progress, observe, settle)
         evenness = measure_evenness(skin, points, normals)
         h = lattice_spacing(area, len(points))
@@ -133,22 +133,25 @@ def sample_body(
 def _clear_creases(
     points: np.ndarray, normals: np.ndarray, skin: Skin, solid: Surface, spacing: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Take particles in the crease between two parts a little away from it, so that they look out of the solid."""
+    """Take particles that look into the solid, in creases between parts and ends of slits, the way to the middle of their piece.
+
+    Pieces were asked there whether they are free.
+    """
     _, face = skin.closest(points, up=normals)
-    corner = skin.triangles[face]
-    inward = np.cross(skin.normals[face][:, None], np.roll(corner, -1, axis=1) - corner)
-    inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), np.finfo(float).tiny)
-    depth = np.einsum("nij,nij->ni", points[:, None] - corner, inward)  # below each edge of the piece
-    away = inward[np.arange(len(points)), depth.argmin(axis=1)]
-    begin = points
+    way = skin.triangles[face].mean(axis=1) - points
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(float).tiny)
+    outward = points - _OUTWARD * solid.unit * way  # so that none counts as free that lies in the other wall itself
+    buried = np.flatnonzero(np.abs(winding_before(outward, normals, solid)) > 0.5)
     points = points.copy()
+    begin = points[buried]
     for share in _ASIDE:
-        buried = np.flatnonzero(np.abs(winding_before(points, normals, solid)) > 0.5)
         if not len(buried):
             break
-        aside, face = skin.closest(begin[buried] + share * spacing * away[buried], up=normals[buried])
+        there, face = skin.closest(begin + share * spacing * way[buried], up=normals[buried])
         same = np.einsum("ij,ij->i", skin.normals[face], normals[buried]) > 0.9  # not over to the other part
-        points[buried[same]] = aside[same]
+        free = same & (np.abs(winding_before(there, normals[buried], solid)) < 0.5)
+        points[buried[free]] = there[free]
+        buried, begin = buried[~free], begin[~free]
     return points, normals
 
 

@@ -4,11 +4,17 @@ import numpy as np
 
 from sampler.crossing import count_layers, crossing_planes, cut_triangles
 from sampler.surface import Surface
+from sampler.topology import link_items
 
 _STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what is there
 _TRIAL = 4000  # random places that show whether anything is buried at all
 _DEEPEST = 400  # cuts through one triangle
 _ISLAND = 1.5  # triangles longer than this are halved, others cut along the planes that cross them; in spacings
+_NARROW = 1e-7  # of the diagonal: narrower triangles have no normal in single precision
+_THIRDS = (np.ones((3, 3)) + 3.0 * np.eye(3)) / 6.0  # places of a triangle, the middles of parts of it
+_MIDDLE = np.array([[0.36, 0.34, 0.3], [0.31, 0.36, 0.33]])  # near its middle, but hardly on edges of others
+_SLIT = 0.1  # longest edge of the pieces that slits are cut into, in spacings
+_SPECK = 0.01  # area of a speck, in squared spacings
 _MOST, _FINEST = 10, 0.5  # cuts per particle to come, after which only triangles longer than so many spacings are cut
 
 
@@ -17,8 +23,7 @@ class Skin(Surface):
 
     def places(self, number: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         """Random places, so many over the area and as many over the longest edges, so that narrow strips get their share."""
-        length = np.linalg.norm(self.triangles - np.roll(self.triangles, -1, axis=1), axis=2).max(axis=1)
-        both = self.sample(number, random), self.sample(number, random, length)
+        both = self.sample(number, random), self.sample(number, random, _longest_edges(self.triangles))
         return tuple(np.concatenate(pair) for pair in zip(*both, strict=True))
 
     def sample(self, number: int, random: np.random.Generator, weight: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -61,7 +66,7 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
     most = len(triangles) // 2 + _MOST * float(Surface.areas_of(triangles).sum()) / spacing**2
     pieces, parents, cuts = [], [], 0
     for _ in range(_DEEPEST):
-        edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+        edge = _longest_edges(triangles)
         worth = np.flatnonzero(edge > (0.0 if cuts < most else _FINEST * spacing))
         crossed, normals, places = crossing_planes(triangles[worth], around, _STEP * around.unit)
         crossed = worth[crossed]
@@ -82,6 +87,77 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
     pieces, parents = np.concatenate(pieces), np.concatenate(parents)
     free, layers = _ask(pieces.mean(axis=1), Surface.normals_of(pieces), around)
     return pieces[free], parents[free], layers[free]
+
+
+def touchable_parts(triangles: np.ndarray, solid: Surface | None, spacing: float) -> np.ndarray:
+    """Parts of free triangles, shape (n, 3, 3) [m], that particles are to cover, shape (m, 3, 3) [m].
+
+    Left out are triangles too narrow to have a normal; folds, on which more of the solid's faces look the other way, so that
+    those are the skin there; the ends of slits; and specks, such as pinholes between parts, farther than a spacing from the rest.
+    """
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    narrow = _NARROW * np.linalg.norm(high - low) * _longest_edges(triangles)
+    triangles = triangles[2.0 * Surface.areas_of(triangles) > narrow]
+    if solid is not None:
+        triangles = _outside_slits(np.delete(triangles, _folds(triangles, solid), axis=0), solid, spacing)
+    island = _islands(triangles, 0.25 * spacing)
+    speck = np.bincount(island, Surface.areas_of(triangles))[island] < _SPECK * spacing**2
+    speck &= _longest_edges(triangles) < 0.25 * spacing
+    if speck.any() and not speck.all():
+        middle = triangles[speck].mean(axis=1)
+        speck[speck] = np.linalg.norm(Surface(triangles[~speck]).closest(middle)[0] - middle, axis=1) > spacing
+        triangles = triangles[~speck]
+    return triangles
+
+
+def _longest_edges(triangles: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+
+
+def _folds(triangles: np.ndarray, solid: Surface) -> np.ndarray:
+    """Numbers of triangles on which more faces look the other way than theirs."""
+    fold, normals = np.arange(len(triangles)), Surface.normals_of(triangles)
+    for weight in _MIDDLE:
+        places = np.einsum("nij,i->nj", triangles[fold], weight)
+        fold = fold[count_layers(places, normals[fold], solid, _STEP * solid.unit) < 0]
+    return fold
+
+
+def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.ndarray:
+    """Triangles without those parts before which there is no room; slits that narrow do not end where a plane could cut."""
+    places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
+    if np.all(np.abs(winding_before(places, normals, solid)) < 0.5):
+        return triangles
+    large = _longest_edges(triangles) > _SLIT * spacing
+    kept, triangles, first = [triangles[~large]], triangles[large], True
+    while len(triangles):
+        free = _room(triangles, _THIRDS, solid).sum(axis=1)
+        kept.append(triangles[(free == 3) | (first & (free == 0))])  # the latter were judged free all the same
+        triangles, first = _halve(triangles[(free > 0) & (free < 3)]), False
+        large = _longest_edges(triangles) > _SLIT * spacing
+        small, triangles = triangles[~large], triangles[large]
+        kept.append(small[_room(small, np.full((1, 3), 1.0 / 3.0), solid)[:, 0]])
+    return np.concatenate(kept)
+
+
+def _room(triangles: np.ndarray, weights: np.ndarray, solid: Surface) -> np.ndarray:
+    """Whether there is room before places of triangles, given by the weights, shape (k, 3), of their corners; shape (n, k)."""
+    places = np.einsum("nij,ki->nkj", triangles, weights).reshape(-1, 3)
+    before = winding_before(places, np.repeat(Surface.normals_of(triangles), len(weights), axis=0), solid)
+    return (np.abs(before) < 0.5).reshape(-1, len(weights))
+
+
+def _islands(triangles: np.ndarray, cell: float) -> np.ndarray:
+    """Numbers, alike for triangles whose middles lie in the same cube of a grid or in neighbouring ones, shape (n,)."""
+    place = np.floor(triangles.mean(axis=1) / cell).astype(np.int64)
+    place -= place.min(axis=0) - 1
+    size = place.max(axis=0) + 2
+    key, inverse = np.unique(np.ravel_multi_index(place.T, size), return_inverse=True)
+    steps = np.indices((3, 3, 3)).reshape(3, -1).T[14:] - 1  # half of the neighbours; the others are theirs
+    beside = key[:, None] + steps @ [size[1] * size[2], size[2], 1]
+    found = np.minimum(np.searchsorted(key, beside), len(key) - 1)
+    here, which = np.nonzero(key[found] == beside)
+    return link_items(len(key), here, found[here, which])[0][inverse]
 
 
 def winding_before(points: np.ndarray, normals: np.ndarray, around: Surface) -> np.ndarray:

@@ -15,6 +15,7 @@ _HALVINGS = 7  # of the range in which the distance of the first placing is soug
 _TURNS, _REFILL_TURNS = 120, 30
 _REFILLS = 16
 _SAMPLED = 40  # places per particle at which gaps are looked for
+_CONFIRMED = 80  # and where none is found, once more
 _DOUBT = 0.08  # places so near to being a gap are looked at more closely, in spacings
 _CLOSER = (0.10, 0.10, 0.05, 0.05)  # how far beside them, in spacings
 _STRENGTH = 0.25  # of a push, in spacings
@@ -74,11 +75,14 @@ def spread_particles(
     state.crowding = state.crowd.numpy()
     state.pinned = np.zeros(start, bool)
     places = skin.places(_SAMPLED * number, random)
-    best, least, stuck = None, np.inf, 0
+    best, least, stuck, sure = None, np.inf, 0, False
     for turn in range(_REFILLS + 1):
         found = settle(*state.result())  # on an edge either face may be the nearest; judge by the final choice
         state.points, state.normals = skin.shift(found[0]), state.vectors(found[1])
         places, gaps, crowded, fault = state.faults(places, random)
+        if fault == 0.0 and not sure:  # a gap on a small piece may have had no place
+            fresh, gaps, crowded, fault = state.faults(skin.places(_CONFIRMED * number, random), random)
+            places, sure = _joined(places, fresh), True
         stuck = 0 if fault < least else stuck + 1
         if fault < least:
             best, least = found, fault

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from shapes import SOLIDS, THIN, robot_mesh, wavy_ball, wedge
+from shapes import SOLIDS, THIN, robot_mesh, solid_angle_inside, wavy_ball, wedge
 
 from sampler import MeshError, SignedDistance, make_field, read_mesh, repair_mesh, sample_body
 from sampler.mass import integrate
@@ -286,3 +286,17 @@ def test_overlapping_parts_with_faces_in_one_plane_count_once(shift, turn):
     assert body.volume == pytest.approx(volume, rel=2e-3)
     centre = trimesh.transformations.rotation_matrix(turn, (1.0, 2.0, 3.0))[:3, :3] @ (first / volume)
     assert body.centre == pytest.approx(centre, abs=2e-3 * edge)
+
+
+def test_no_particle_looks_into_the_wall_beside_it():
+    number, height = 24, 0.05
+    angle, reach = np.pi * np.arange(2 * number) / number, np.where(np.arange(2 * number) % 2, 0.1, 0.04)
+    rim = np.stack([reach * np.cos(angle), reach * np.sin(angle), 0.0 * angle], axis=1)  # of a gear of sharp teeth
+    corners = np.concatenate([rim, rim + [0, 0, height], [[0, 0, 0], [0, 0, height]]])
+    a, size = np.arange(2 * number), 2 * number
+    b = np.roll(a, -1)
+    sides = [(a, b, b + size), (a, b + size, a + size), (b, a, 0 * a + 2 * size), (a + size, b + size, 0 * a + 2 * size + 1)]
+    mesh = trimesh.Trimesh(corners, np.concatenate([np.stack(side, axis=1) for side in sides]), process=False)
+    body = sample_body(mesh, radius=0.002, count=1500)
+    before = body.points + 2e-5 * np.linalg.norm(mesh.extents) * body.normals
+    assert not solid_angle_inside(body.triangles, before).any()

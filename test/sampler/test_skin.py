@@ -6,7 +6,8 @@ import trimesh
 from shapes import solid_angle_inside
 
 from sampler.mass import integrate
-from sampler.skin import free_triangles
+from sampler.skin import Skin, free_triangles, touchable_parts, winding_before
+from sampler.spreading import spread_particles
 from sampler.surface import Surface
 
 
@@ -84,3 +85,56 @@ def test_no_piece_is_given_up_where_many_parts_cross():
     whole = 2 * 4.0 + 4 * 2.0 * 0.2 + number * 2 * (0.01 * 1.5 + 0.01 * 0.5 + 1.5 * 0.5)
     hidden = number * (2 * 0.01 * 1.5 + 2 * 0.2 * (1.5 + 0.01))
     assert Surface.areas_of(free).sum() == pytest.approx(whole - hidden, rel=1e-12)
+
+
+def test_folds_are_no_skin_of_their_own():
+    plate = box((1.0, 1.0, 0.2), (0, 0, 0))
+    flap = np.array([[[0.1, 0.1, 0.1], [0.3, 0.13, 0.1], [0.17, 0.32, 0.1]]])
+    triangles = np.concatenate([plate.triangles, flap, flap[:, ::-1]])  # there and back again, over the face
+    kept = touchable_parts(triangles, Surface(triangles), 0.05)
+    assert np.array_equal(kept, triangles[:-1])
+
+
+@pytest.mark.parametrize(("size", "stays"), [(0.004, False), (0.04, True)])
+def test_pinholes_are_not_covered(size, stays):
+    hole = box((size, size, size), (0.03, 0.02, 0.01))
+    hole.invert()
+    triangles = np.concatenate([box((1.0, 1.0, 1.0), (0, 0, 0)).triangles, hole.triangles])
+    assert len(touchable_parts(triangles, Surface(triangles), 0.1)) == 12 + 12 * stays
+
+
+def test_a_small_knob_on_a_plate_is_covered():
+    triangles, _, _ = free_parts(box((1.0, 1.0, 0.2), (0, 0, 0)), box((0.004, 0.004, 0.004), (0.05, 0.02, 0.1)))
+    assert np.array_equal(touchable_parts(triangles, Surface(triangles), 0.1), triangles)
+
+
+def test_triangles_without_a_normal_are_left_out():
+    plate = np.asarray(box((1.0, 1.0, 0.2), (0, 0, 0)).triangles)
+    sliver = np.array([[[0.1, 0.1, 0.1], [0.4, 0.1, 0.1], [0.2, 0.1, 0.1 + 1e-12]]])
+    triangles = np.concatenate([plate, sliver])
+    assert np.array_equal(touchable_parts(triangles, Surface(plate), 0.05), plate)
+
+
+def test_the_end_of_a_slit_is_no_skin():
+    plate, lid = box((1.0, 1.0, 0.2), (0, 0, -0.1)), box((1.0, 0.8, 0.2), (0, 0, 0.1))
+    slope, step = 2e-4, 2e-5
+    lid.vertices[:, 2] += slope * (lid.vertices[:, 0] + 0.5) * (lid.vertices[:, 2] < 0.1)  # its underside; touches at one end
+    triangles = np.concatenate([plate.triangles, lid.triangles])
+    solid = Surface(triangles)
+    kept = touchable_parts(free_triangles(triangles, solid, 0.05)[0], solid, 0.05)
+    lost = plate.area + lid.area - Surface.areas_of(kept).sum()
+    assert lost == pytest.approx(2 * 0.8 * step * solid.unit / slope, rel=0.05)
+    middle = kept.mean(axis=1)
+    assert np.mean(np.abs(winding_before(middle, Surface.normals_of(kept), solid)) > 0.5) < 0.02
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_small_pieces_that_face_the_other_way_are_found(seed):
+    grid = np.stack(np.meshgrid(np.arange(20), np.arange(20), [0]), -1).reshape(-1, 1, 3)
+    plate = np.concatenate([grid + half for half in ([[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]])]) / 20
+    flag = np.array([[0.0, 0.5, -0.02], [0.0, 0.503, -0.02], [0.003, 0.5, -0.02]])  # faces down, a few of all places fall on it
+    flags = flag + np.linspace([0.1, 0, 0], [0.9, 0, 0], 12)[:, None]
+    points, normals = spread_particles(Skin(np.concatenate([plate, flags])), 400, seed)
+    below = points[normals[:, 2] < 0.0]
+    away = np.linalg.norm(flags.mean(axis=1)[:, None] - below, axis=2).min(axis=1)
+    assert away.max() < np.sqrt(2.0 / np.sqrt(3.0) / 400)
