@@ -23,7 +23,7 @@ _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest 
 _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
 _WALL_SAMPLES = 4000
-_OUTWARD = 1e-5  # of the diagonal
+_OUTWARD = 1e-5  # of the diagonal: how far out of its piece a particle is asked what is before it
 _ASIDE = (0.01, 0.03, 0.1, 0.3)  # ways out of the crease between two parts that are tried, in spacings
 
 Progress = Callable[[float], None]

@@ -149,7 +149,7 @@ class ExplicitDem:
             self._programs.clear()
 
     def _play(self, stepping: bool) -> None:
-        """Renew the lists and step; where a list had no room this stops early, and there is room when it is played again."""
+        """Renew the lists and, if ``stepping``, step; stops early where a list had no room, with room when played again."""
         flags = self.arrays.flags
         flags.running.fill_(1)
         flags.proceed.fill_(1)

@@ -112,7 +112,10 @@ def build_gather_pairs(recipe: Recipe) -> wp.Function:
 
 @cache
 def build_gather(recipe: Recipe, walls: bool, tools: bool) -> wp.Function:
-    """Warp function that sums force [N] and torque [N m] over all contacts of a grain, in the order of the lists."""
+    """Warp function that sums force [N] and torque [N m] over all contacts of a grain, in the order of the lists.
+
+    Tools that touch nothing, ``at_tools`` false, cost nothing.
+    """
     vec3, vec4, real = recipe.precision.vec3, recipe.precision.vec4, recipe.precision.real
     gather_pairs, gather_listed = build_gather_pairs(recipe), build_gather_listed(recipe)
 
@@ -134,12 +137,14 @@ def build_gather(recipe: Recipe, walls: bool, tools: bool) -> wp.Function:
         tool_force: wp.array(dtype=vec4),
         tool_couple: wp.array(dtype=vec4),
         tool_moment: wp.array(dtype=vec4),
+        at_tools: bool,
     ):
         total, torque = gather_pairs(i, radius, pair_starts, pair_force, pair_couple, pair_moment, met_starts, met_pairs)
         if wp.static(walls):
             total, torque = gather_listed(total, torque, i, radius, wall_starts, wall_force, wall_couple, wall_moment)
         if wp.static(tools):
-            total, torque = gather_listed(total, torque, i, radius, tool_starts, tool_force, tool_couple, tool_moment)
+            if at_tools:
+                total, torque = gather_listed(total, torque, i, radius, tool_starts, tool_force, tool_couple, tool_moment)
         return vec3(total[0], total[1], total[2]), vec3(torque[0], torque[1], torque[2])
 
     return gather

@@ -4,6 +4,7 @@ from functools import cache
 
 import warp as wp
 
+from sand_sim.engine.count import count_of
 from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_TOO_FAST
 from sand_sim.engine.gather import build_gather
 from sand_sim.engine.kernel import kernel, sure
@@ -79,6 +80,9 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
         grains_moved: wp.array(dtype=int),
         fault: wp.array(dtype=int),
     ):
+        at_tools = False
+        if wp.static(tools):
+            at_tools = tool_starts[count_of(spans)] > 0
         for k in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
             i = sure(k)
             here = place[i]
@@ -102,6 +106,7 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
                 tool_force,
                 tool_couple,
                 tool_moment,
+                at_tools,
             )
             part = int(-1)
             if wp.static(bodies):
@@ -236,6 +241,7 @@ def build_complete_step(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
                     tool_force,
                     tool_couple,
                     tool_moment,
+                    True,
                 )
                 part = int(-1)
                 if wp.static(bodies):
