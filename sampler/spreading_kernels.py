@@ -8,23 +8,32 @@ MODULE = "sampler_spreading"
 
 _SAME = wp.constant(-0.2)  # cosine between normals from which two places lie on one skin
 _OTHER = wp.constant(-0.7)  # and below which they lie on different skins
-_ACROSS = wp.constant(0.8)  # range of the repulsion between skins, of that on one skin
-_CORE, _HARD = wp.constant(8.0), wp.constant(0.6)  # strength and range, in spacings, of what keeps particles apart in any case
+_SEEN = wp.constant(5.0e-5)  # how far places that look at each other across a gap lie before one another's planes
+_THROWN = wp.constant(0.85)  # how near to each other particles of different skins may be thrown, of those on one skin
+_CORE, _HARD = wp.constant(8.0), wp.constant(1.25)  # what holds particles apart: strength, and range, of how far they were thrown
 _FARTHEST = wp.constant(0.3)  # of a step, in spacings
 
 
 @wp.func
-def same_skin(a: wp.vec3, b: wp.vec3) -> float:
-    """1 for places on one skin, 0 for the two skins of a wall, smooth between."""
-    share = wp.clamp((wp.dot(a, b) - _OTHER) / (_SAME - _OTHER), 0.0, 1.0)
+def facing(between: wp.vec3, up: wp.vec3, other: wp.vec3) -> bool:
+    """Whether two places, given the way from the first to the second, look at each other across a gap."""
+    return wp.dot(between, up) > _SEEN and wp.dot(between, other) < -_SEEN
+
+
+@wp.func
+def same_skin(between: wp.vec3, up: wp.vec3, other: wp.vec3) -> float:
+    """1 for places on one skin or across a gap, 0 for the two skins of a wall, smooth between."""
+    share = wp.clamp((wp.dot(up, other) - _OTHER) / (_SAME - _OTHER), 0.0, 1.0)
+    if share < 1.0 and facing(between, up, other):
+        return 1.0
     return share * share * (3.0 - 2.0 * share)
 
 
 @wp.func
 def way_along(p: wp.vec3, up: wp.vec3, q: wp.vec3, other: wp.vec3) -> float:
-    """Distance between places of a surface: straight on one skin, else around the edge in which their planes meet."""
+    """Distance between places of a surface: straight on one skin or across a gap, else around the edge of their planes."""
     between = q - p
-    if wp.dot(up, other) >= _SAME:
+    if wp.dot(up, other) >= _SAME or facing(between, up, other):
         return wp.length(between)
     edge = wp.cross(up, other)
     square = wp.length_sq(edge)
@@ -55,13 +64,13 @@ def push_apart(
     face_normals: wp.array(dtype=wp.vec3),
     held: wp.array(dtype=int),
     spacing: float,
+    apart: float,
     strength: float,
     first: int,
     moved: wp.array(dtype=wp.vec3),
     moved_normals: wp.array(dtype=wp.vec3),
-    crowding: wp.array(dtype=float),
 ):
-    """Push each point away from its neighbours, less so from those on another skin, and bring it back to the surface."""
+    """Push each point away from its neighbours, also through a wall, and bring it back to the surface."""
     i = first + wp.tid()
     here = points[i]
     up = normals[i]
@@ -70,19 +79,13 @@ def push_apart(
     if held[i] != 0:
         return
     push = wp.vec3(0.0)
-    crowd = float(0.0)
     for j in wp.hash_grid_query(grid, here, 2.0 * spacing):
         if j != i:
             away = here - points[j]
             distance = wp.length(away)
             if distance < 2.0 * spacing:
-                same = same_skin(up, normals[j])
-                # The two skins of a thin wall only keep their particles from lying on top of one another.
-                weight = repulsion(distance, spacing * (_ACROSS + (1.0 - _ACROSS) * same))
-                weight += _CORE * wp.max(_HARD - distance / spacing, 0.0)
-                crowd += same * weight
+                weight = repulsion(distance, spacing) + _CORE * wp.max(_HARD * apart - distance, 0.0) / spacing
                 push += away * (weight / wp.max(distance, 1.0e-3 * spacing))
-    crowding[i] = crowd
     step = push * strength
     step *= wp.min(1.0, _FARTHEST * spacing / wp.max(wp.length(step), 1.0e-12))
     there = here + step
@@ -144,12 +147,33 @@ def throw_darts(
             for j in wp.hash_grid_query(grid, here, apart):
                 if kept[j] == 1:
                     distance = wp.length(points[j] - here)
-                    same = same_skin(normals[i], normals[j])
-                    if distance < apart * (0.5 + 0.5 * same):
+                    same = same_skin(points[j] - here, normals[i], normals[j])
+                    if distance < apart * (_THROWN + (1.0 - _THROWN) * same):
                         free = 0
             if free == 1:
                 kept[i] = 1
                 number += 1
+
+
+@wp.struct
+class Nearest:
+    """A particle, how far it is, and how far the next one."""
+
+    which: int
+    way: float
+    next: float
+
+
+@wp.func
+def nearer(nearest: Nearest, which: int, way: float) -> Nearest:
+    """The nearest of those met before and this one."""
+    if way < nearest.way:
+        nearest.next = wp.min(nearest.next, nearest.way)
+        nearest.which = which
+        nearest.way = way
+    else:
+        nearest.next = wp.min(nearest.next, way)
+    return nearest
 
 
 @wp.kernel(enable_backward=False, module=MODULE)
@@ -163,22 +187,33 @@ def find_gaps(
     first: int,
     distance: wp.array(dtype=float),
     own_distance: wp.array(dtype=float),
+    without: wp.array(dtype=float),
+    own_without: wp.array(dtype=float),
 ):
-    """Distance of samples from the nearest particle, and from the nearest one on their own skin; at most ``reach``."""
+    """Distance of samples from the nearest particle, and from the nearest one on their own skin; at most ``reach``.
+
+    For each particle also the largest such distance if it were not there, hardly more than half the reach.
+    """
     i = first + wp.tid()
     here = samples[i]
-    best = reach
-    own = reach
     near = 0.5 * reach
+    closest = Nearest(int(-1), reach, near)
+    own = Nearest(int(-1), reach, near)
     for j in wp.hash_grid_query(grid, here, near):
-        best = wp.min(best, wp.length(points[j] - here))
-        own = wp.min(own, way_along(here, sample_normals[i], points[j], normals[j]))
-    if own > near:  # next to never
+        closest = nearer(closest, j, wp.length(points[j] - here))
+        own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j]))
+    if own.way > near:  # next to never
+        closest = Nearest(int(-1), reach, near)
+        own = Nearest(int(-1), reach, near)
         for j in wp.hash_grid_query(grid, here, reach):
-            best = wp.min(best, wp.length(points[j] - here))
-            own = wp.min(own, way_along(here, sample_normals[i], points[j], normals[j]))
-    distance[i] = best
-    own_distance[i] = own
+            closest = nearer(closest, j, wp.length(points[j] - here))
+            own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j]))
+    distance[i] = closest.way
+    own_distance[i] = own.way
+    if closest.which >= 0:
+        wp.atomic_max(without, closest.which, closest.next)
+    if own.which >= 0:
+        wp.atomic_max(own_without, own.which, own.next)
 
 
 @wp.kernel(enable_backward=False, module=MODULE)
