@@ -138,8 +138,10 @@ def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.
     pieces, parent, whole = triangles[judged], np.flatnonzero(judged), np.ones(len(triangles), bool)
     parts = []
     while len(pieces):
-        edge, room = _longest_edges(pieces), _room(pieces, _THIRDS, solid, step).sum(axis=1)
-        done = (edge <= _SLIT * spacing) | ((edge <= _LARGE * spacing) & (room % 3 == 0))
+        edge, room = _longest_edges(pieces), np.ones(len(pieces), int)
+        small = edge <= _LARGE * spacing
+        room[small] = _room(pieces[small], _THIRDS, solid, step).sum(axis=1)
+        done = small & ((room % 3 == 0) | (edge <= _SLIT * spacing))
         stays = done & (room >= 2)
         whole[parent[done & ~stays]] = False
         parts.append((pieces[stays], parent[stays]))

@@ -27,7 +27,7 @@ _LEAST = 0.40  # particles nearer than this to one another are a fault, in spaci
 _LONELY, _BESIDE = 1.09, (0.6, 1.06)  # those farther than this from all others get a neighbour, how far beside them; in spacings
 _AROUND = 4.0  # distance from a filled gap or a removed particle within which others move, in spacings
 _MEASURED = 100  # places per particle at which the result is measured
-_SPARE = 0.005  # share of the particles kept back for gaps, and share that may be added above the wanted number
+_SPARE, _MORE = 0.005, 0.009  # share of the particles kept back for gaps, and share that may be added above the wanted number
 _PATIENCE = 6  # refills without improvement after which the best is taken
 
 Observer = Callable[[np.ndarray], None]
@@ -119,7 +119,7 @@ class _State:
         self.grid = wp.HashGrid(128, 128, 128, device=self.device)
         self.corners = skin.shift(skin.triangles.reshape(-1, 3))
         self.face_normals = self.vectors(skin.normals)
-        self.most = number + int(_SPARE * number)
+        self.most = number + int(_MORE * number)
 
     def vectors(self, values: np.ndarray) -> wp.array:
         return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
