@@ -13,10 +13,8 @@ _ISLAND = 1.5  # triangles longer than this are halved, others cut along the pla
 _NARROW = 1e-7  # of the diagonal: narrower triangles have no normal in single precision
 _THIRDS = (np.ones((3, 3)) + 3.0 * np.eye(3)) / 6.0  # places of a triangle, the middles of parts of it
 _MIDDLE = np.array([[0.36, 0.34, 0.3], [0.31, 0.36, 0.33]])  # near its middle, but hardly on edges of others
-_SLIT, _LARGE = (
-    0.1,
-    0.5,
-)  # longest edge of the pieces that slits are cut into, and of those no part of which may be free; in spacings
+_SLIT, _LARGE = 0.1, 0.5  # longest edge of the pieces at the ends of slits, and of those inside or beside them, in spacings
+_WIDE = 4.0  # triangles with longer edges, in roots of their area, are needles
 _SHUT = 0.005  # width of slits whose walls are no skin, in spacings
 _SPECK = 0.01  # area of a speck, in squared spacings
 _MOST, _FINEST = 10, 0.5  # cuts per particle to come, after which only triangles longer than so many spacings are cut
@@ -138,10 +136,10 @@ def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.
     pieces, parent, whole = triangles[judged], np.flatnonzero(judged), np.ones(len(triangles), bool)
     parts = []
     while len(pieces):
-        edge, room = _longest_edges(pieces), np.ones(len(pieces), int)
-        small = edge <= _LARGE * spacing
+        size = np.minimum(_longest_edges(pieces), _WIDE * np.sqrt(Surface.areas_of(pieces)))  # needles would become very many
+        small, room = size <= _LARGE * spacing, np.ones(len(pieces), int)
         room[small] = _room(pieces[small], _THIRDS, solid, step).sum(axis=1)
-        done = small & ((room % 3 == 0) | (edge <= _SLIT * spacing))
+        done = small & ((room % 3 == 0) | (size <= _SLIT * spacing))
         stays = done & (room >= 2)
         whole[parent[done & ~stays]] = False
         parts.append((pieces[stays], parent[stays]))
