@@ -64,8 +64,31 @@ def test_both_skins_of_a_plate_are_covered(share):
     body = sample_body(plate, radius=0.002, count=800)
     near = neighbours(body.points) / body.spacing
     assert skin_gap(plate, body) <= body.spacing
+    assert near.std() / near.mean() <= 0.065
     assert near.min() >= 0.35
     assert near.max() <= 1.10
+
+
+@pytest.mark.parametrize("gap", [1e-4, 1e-3, 3e-3])
+def test_skins_that_face_each_other_cover_one_another(gap):
+    lower, upper = (trimesh.creation.box((0.1, 0.06, 0.02)).apply_translation([0, 0, z]) for z in (0.0, 0.02 + gap))
+    pair = trimesh.util.concatenate([lower, upper])
+    body = sample_body(pair, radius=0.002, count=800)
+    near = neighbours(body.points) / body.spacing
+    assert near.std() / near.mean() <= 0.065
+    assert near.max() <= 1.10
+    assert distances(surface_samples(pair)[0], body.points).max() <= 0.80 * body.spacing
+    between = np.abs(body.points[:, 2] - 0.01 - 0.5 * gap) < 0.6 * gap
+    apart = np.count_nonzero(sample_body(lower, radius=0.002, spacing=body.spacing).points[:, 2] > 0.00999)
+    assert between.sum() < 1.7 * apart  # each by itself would take twice as many
+
+
+def test_walls_beside_solids_are_as_even():
+    plate = trimesh.creation.box((0.1, 0.06, 0.0004)).apply_translation([0.079, 0, 0])
+    body = sample_body(trimesh.util.concatenate([trimesh.creation.box((0.06, 0.06, 0.06)), plate]), radius=0.002, count=1200)
+    near = neighbours(body.points) / body.spacing
+    assert near.std() / near.mean() <= 0.065
+    assert body.evenness.skin_coverage <= 1.0
 
 
 def crossing_fins():
@@ -175,9 +198,10 @@ def test_contact_normals_lean_as_much_as_is_told(grain):
     assert lean.max() >= 0.85 * body.roughness(grain)
 
 
-def test_inset_keeps_the_outer_size():
+@pytest.mark.parametrize("seed", range(4))
+def test_inset_keeps_the_outer_size(seed):
     box = trimesh.creation.box((0.1, 0.07, 0.05))
-    body = sample_body(box, radius=0.004, inset=True)
+    body = sample_body(box, radius=0.004, inset=True, seed=seed)
     out = np.abs(body.points) + body.radius - np.array([0.05, 0.035, 0.025])
     assert np.abs(out.max(axis=1)).max() < 0.02 * body.radius
     inner = trimesh.creation.box(np.array([0.1, 0.07, 0.05]) - 2.0 * body.radius)

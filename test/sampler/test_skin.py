@@ -129,6 +129,13 @@ def test_the_end_of_a_slit_is_no_skin():
     assert np.mean(np.abs(winding_before(middle, Surface.normals_of(kept), solid, width / solid.unit)) > 0.5) < 0.02
 
 
+def test_what_lies_open_beside_a_slit_stays():
+    plate, lid = box((1.0, 1.0, 0.2), (0, 0, -0.1)), box((0.93, 0.93, 0.2), (0, 0, 0.1 + 1e-4))
+    triangles = np.concatenate([plate.triangles, lid.triangles])
+    kept = touchable_parts(triangles, Surface(triangles), 0.05)
+    assert Surface.areas_of(kept).sum() == pytest.approx(plate.area + lid.area - 2 * 0.93**2, rel=0.01)
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_small_pieces_that_face_the_other_way_are_found(seed):
     grid = np.stack(np.meshgrid(np.arange(20), np.arange(20), [0]), -1).reshape(-1, 1, 3)
