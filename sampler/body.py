@@ -17,7 +17,7 @@ class Evenness:
         nearest, farthest: smallest and largest distance to the nearest neighbour.
         coverage: largest distance of a place of the surface from the nearest particle.
         skin_coverage: the same, measured along the surface, so that the other skin of a thin wall does not count; one across a
-            gap does.
+            gap narrower than 0.05 spacings does.
     """
 
     variation: float

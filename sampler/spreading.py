@@ -23,6 +23,7 @@ _CLOSER = (0.10, 0.10, 0.05, 0.05)  # how far beside them, in spacings
 _STRENGTH = 0.25  # of a push, in spacings
 _GAP, _SKIN_GAP = 0.78, 0.95  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
 _GAPS_APART = 1.2  # gaps nearer than this to a deeper one wait, in spacings
+_ROOM, _NEAR = 0.55, 0.4  # a gap is filled so far from particles of other skins, or as far as can be so near to it; in spacings
 _LEAST = 0.40  # particles nearer than this to one another are a fault, in spacings
 _LONELY, _BESIDE = 1.09, (0.6, 1.06)  # those farther than this from all others get a neighbour, how far beside them; in spacings
 _AROUND = 4.0  # distance from a filled gap or a removed particle within which others move, in spacings
@@ -178,8 +179,21 @@ class _State:
         gaps = np.array(chosen, int)
         open_ = np.maximum(free[gaps] - _GAP, 0.0).sum()
         fault = float(4.0 * open_ + np.maximum(excess[gaps], 0.0).sum() + (_LEAST - nearest[crowded]).sum())
+        fill = self._roomiest(places, gaps, *found)
         watched = (np.arange(len(excess)) < self.fixed) | (excess > -_WATCHED)
-        return _at(places, watched), _at(places, gaps), crowded, fault
+        return _at(places, watched), _at(places, fill), crowded, fault
+
+    def _roomiest(self, places: Places, gaps: np.ndarray, free: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """Gaps, or in place of those with a particle of another skin behind them, places beside them that are farther from it."""
+        roomy = np.flatnonzero((free > _ROOM) & (own > _ROOM))
+        chosen = gaps.copy()
+        for n, k in enumerate(gaps):
+            if free[k] < _ROOM:
+                near = np.linalg.norm(places[0][roomy] - places[0][k], axis=1) < _NEAR * self.spacing
+                near = roomy[near & (places[1][roomy] @ places[1][k] > 0.5)]
+                if len(near):
+                    chosen[n] = near[free[near].argmax()]
+        return chosen
 
     def _beside(self, places: Places, doubtful: np.ndarray, random: np.random.Generator) -> Places:
         """Places a little aside of doubtful ones."""

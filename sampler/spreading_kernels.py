@@ -8,32 +8,33 @@ MODULE = "sampler_spreading"
 
 _SAME = wp.constant(-0.2)  # cosine between normals from which two places lie on one skin
 _OTHER = wp.constant(-0.7)  # and below which they lie on different skins
-_SEEN = wp.constant(5.0e-5)  # how far places that look at each other across a gap lie before one another's planes
+_SEEN = wp.constant(5.0e-5)  # least width of a gap
+_NARROW = wp.constant(0.05)  # gaps narrower than this count as closed, so that either skin's particles cover both; in spacings
 _THROWN = wp.constant(0.85)  # how near to each other particles of different skins may be thrown, of those on one skin
 _CORE, _HARD = wp.constant(8.0), wp.constant(1.25)  # what holds particles apart: strength, and range, of how far they were thrown
 _FARTHEST = wp.constant(0.3)  # of a step, in spacings
 
 
 @wp.func
-def facing(between: wp.vec3, up: wp.vec3, other: wp.vec3) -> bool:
-    """Whether two places, given the way from the first to the second, look at each other across a gap."""
-    return wp.dot(between, up) > _SEEN and wp.dot(between, other) < -_SEEN
+def facing(between: wp.vec3, up: wp.vec3, other: wp.vec3, gap: float) -> bool:
+    """Whether two places, given the way from the first to the second, look at each other across a gap at most so wide."""
+    forth = wp.dot(between, up)
+    back = -wp.dot(between, other)
+    return wp.min(forth, back) > _SEEN and wp.max(forth, back) < gap
 
 
 @wp.func
-def same_skin(between: wp.vec3, up: wp.vec3, other: wp.vec3) -> float:
-    """1 for places on one skin or across a gap, 0 for the two skins of a wall, smooth between."""
-    share = wp.clamp((wp.dot(up, other) - _OTHER) / (_SAME - _OTHER), 0.0, 1.0)
-    if share < 1.0 and facing(between, up, other):
-        return 1.0
+def same_skin(a: wp.vec3, b: wp.vec3) -> float:
+    """1 for places on one skin, 0 for the two skins of a wall, smooth between."""
+    share = wp.clamp((wp.dot(a, b) - _OTHER) / (_SAME - _OTHER), 0.0, 1.0)
     return share * share * (3.0 - 2.0 * share)
 
 
 @wp.func
-def way_along(p: wp.vec3, up: wp.vec3, q: wp.vec3, other: wp.vec3) -> float:
-    """Distance between places of a surface: straight on one skin or across a gap, else around the edge of their planes."""
+def way_along(p: wp.vec3, up: wp.vec3, q: wp.vec3, other: wp.vec3, gap: float) -> float:
+    """Distance between places of a surface: straight on one skin or across a narrow gap, else around the edge of their planes."""
     between = q - p
-    if wp.dot(up, other) >= _SAME or facing(between, up, other):
+    if wp.dot(up, other) >= _SAME or facing(between, up, other, gap):
         return wp.length(between)
     edge = wp.cross(up, other)
     square = wp.length_sq(edge)
@@ -147,7 +148,7 @@ def throw_darts(
             for j in wp.hash_grid_query(grid, here, apart):
                 if kept[j] == 1:
                     distance = wp.length(points[j] - here)
-                    same = same_skin(points[j] - here, normals[i], normals[j])
+                    same = same_skin(normals[i], normals[j])
                     if distance < apart * (_THROWN + (1.0 - _THROWN) * same):
                         free = 0
             if free == 1:
@@ -197,17 +198,18 @@ def find_gaps(
     i = first + wp.tid()
     here = samples[i]
     near = 0.5 * reach
+    narrow = _NARROW * near  # the reach is two spacings
     closest = Nearest(int(-1), reach, near)
     own = Nearest(int(-1), reach, near)
     for j in wp.hash_grid_query(grid, here, near):
         closest = nearer(closest, j, wp.length(points[j] - here))
-        own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j]))
+        own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j], narrow))
     if own.way > near:  # next to never
         closest = Nearest(int(-1), reach, near)
         own = Nearest(int(-1), reach, near)
         for j in wp.hash_grid_query(grid, here, reach):
             closest = nearer(closest, j, wp.length(points[j] - here))
-            own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j]))
+            own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j], narrow))
     distance[i] = closest.way
     own_distance[i] = own.way
     if closest.which >= 0:
