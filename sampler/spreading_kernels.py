@@ -202,14 +202,18 @@ def find_gaps(
     closest = Nearest(int(-1), reach, near)
     own = Nearest(int(-1), reach, near)
     for j in wp.hash_grid_query(grid, here, near):
-        closest = nearer(closest, j, wp.length(points[j] - here))
-        own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j], narrow))
+        way = wp.length(points[j] - here)
+        if way < wp.max(own.way, own.next):  # the way along the skin is no shorter
+            closest = nearer(closest, j, way)
+            own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j], narrow))
     if own.way > near:  # next to never
         closest = Nearest(int(-1), reach, near)
         own = Nearest(int(-1), reach, near)
         for j in wp.hash_grid_query(grid, here, reach):
-            closest = nearer(closest, j, wp.length(points[j] - here))
-            own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j], narrow))
+            way = wp.length(points[j] - here)
+            if way < wp.max(own.way, own.next):
+                closest = nearer(closest, j, way)
+                own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j], narrow))
     distance[i] = closest.way
     own_distance[i] = own.way
     if closest.which >= 0:
