@@ -16,7 +16,7 @@ _TURNS, _REFILL_TURNS = 120, 12
 _REFILLS = 16
 _SAMPLED = 40  # places per particle at which gaps are looked for, over the area; and as many over the edges
 _CONFIRMED = 80  # and where hardly any is left, once more
-_HARDLY = 0.5  # sum of faults, in spacings
+_HARDLY, _FINE = 0.5, 0.02  # sum of faults in spacings at which that is so, and at which all is well
 _DOUBT = 0.08  # places so near to being a gap are looked at more closely, in spacings
 _WATCHED = 0.15  # and other places that were found so near to being one, the next time, too
 _CLOSER = (0.10, 0.10, 0.05, 0.05)  # how far beside them, in spacings
@@ -90,7 +90,7 @@ def spread_particles(
         stuck = 0 if fault < least else stuck + 1
         if fault < least:
             best, least = found, fault
-        if fault == 0.0 or turn == _REFILLS or stuck == _PATIENCE:
+        if fault < _FINE or turn == _REFILLS or stuck == _PATIENCE:
             break
         state.refill(*gaps, crowded, pin=turn > 0)
         for k in range(_REFILL_TURNS):
@@ -166,7 +166,7 @@ class _State:
             beside = np.flatnonzero((away > _BESIDE[0]) & (away < _BESIDE[1]))
             if len(beside):
                 k = beside[free[beside].argmax()]
-                excess[k] = max(excess[k], nearest[i] - _LONELY)
+                excess[k] = max(excess[k], 4.0 * (nearest[i] - _LONELY))
         crowded = np.flatnonzero(nearest < _LEAST)
         crowded = crowded[np.lexsort((nearest[crowded], self.pinned[crowded]))]
         chosen: list[int] = []
