@@ -134,7 +134,7 @@ def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.
         return triangles
     judged = _room(triangles, _THIRDS.mean(axis=0)[None], solid, _STEP)[:, 0]  # the others were judged free all the same
     pieces, parent, whole = triangles[judged], np.flatnonzero(judged), np.ones(len(triangles), bool)
-    parts = []
+    parts = [(triangles[:0], parent[:0])]
     while len(pieces):
         size = np.minimum(_longest_edges(pieces), _WIDE * np.sqrt(Surface.areas_of(pieces)))  # needles would become very many
         small, room = size <= _LARGE * spacing, np.ones(len(pieces), int)
