@@ -3,7 +3,7 @@
 The peers are no dependencies; make a venv for them::
 
     python3.12 -m venv peers && peers/bin/pip install . open3d point-cloud-utils scipy
-    peers/bin/python benchmarks/sampler_peers.py MESH... --count 2000
+    peers/bin/python -m benchmarks.sampler_peers MESH... --count 2000
 
 Prints a table in Markdown. Times are CPU seconds of all threads, reading left out, kernels compiled before.
 """

@@ -16,7 +16,8 @@ class Evenness:
         variation: of the distance to the nearest neighbour, standard deviation over mean.
         nearest, farthest: smallest and largest distance to the nearest neighbour.
         coverage: largest distance of a place of the surface from the nearest particle.
-        skin_coverage: the same, measured along the surface, so that the other skin of a thin wall does not count.
+        skin_coverage: the same, measured along the surface, so that the other skin of a thin wall does not count; one across a
+            gap narrower than 0.05 spacings does.
     """
 
     variation: float

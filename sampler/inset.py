@@ -5,6 +5,8 @@ import numpy as np
 from sampler.surface import Surface
 
 _STEPS, _TURNS = 12, 12
+_ON = 1e-9  # particles nearer than this to the surface lie on it, of the diagonal
+_AROUND = 2.0  # neighbours of a particle are nearer than this, so that a corner has some on each face; in spacings
 _APART = 0.5  # particles nearer than this after the move are dropped, in spacings
 
 
@@ -28,12 +30,15 @@ def inset_particles(
     inward = -_mean_normals(points, normals, spacing)
     for share in np.linspace(1.0 / _STEPS, 1.0, _STEPS):
         place, depth = _deeper(place, depth, points + share * radius * inward, around, radius)
+    slack = _ON * around.unit
     for _ in range(_TURNS):
-        closest, _ = around.closest(place)
+        closest, face = around.closest(place)
         away = place - closest
         length = np.linalg.norm(away, axis=1)
-        step = (radius - length) / np.maximum(length, 1e-9 * around.unit)
-        place, depth = _deeper(place, depth, place + np.clip(step, -1.0, 1.0)[:, None] * away, around, radius)
+        away[length <= slack] = -around.normals[face[length <= slack]]
+        reach = np.maximum(length, radius / _STEPS)
+        step = np.clip(radius - length, -reach, reach) / np.linalg.norm(away, axis=1)
+        place, depth = _deeper(place, depth, place + step[:, None] * away, around, radius, slack)
     shallow = depth < 0.98 * radius
     useless = shallow & _beside(place, ~shallow, spacing)  # stuck at an edge, beside one that came down
     kept = _apart(place, _APART * spacing)
@@ -41,20 +46,20 @@ def inset_particles(
     return place[kept], kept
 
 
-def _deeper(place, depth, trial, around, radius):
-    """The trial where it is nearer to the wanted depth."""
+def _deeper(place, depth, trial, around, radius, slack=0.0):
+    """The trial where it is nearer to the wanted depth, or within the slack: where faces meet it takes several moves."""
     closest, _ = around.closest(trial)
     found = np.linalg.norm(trial - closest, axis=1) * np.where(np.abs(around.winding(trial)) > 0.5, 1.0, -1.0)
-    better = np.abs(found - radius) < np.abs(depth - radius)
+    better = np.abs(found - radius) < np.abs(depth - radius) + slack
     return np.where(better[:, None], trial, place), np.where(better, found, depth)
 
 
 def _mean_normals(points: np.ndarray, normals: np.ndarray, spacing: float) -> np.ndarray:
     """Mean over neighbours that do not face the other way, so that particles on an edge move into the solid."""
     mean = normals.copy()
-    for k in _blocks(points, 1.5 * spacing):
+    for k in _blocks(points, _AROUND * spacing):
         for i in k[0]:
-            near = np.linalg.norm(points[k[1]] - points[i], axis=1) < 1.5 * spacing
+            near = np.linalg.norm(points[k[1]] - points[i], axis=1) < _AROUND * spacing
             same = near & (normals[k[1]] @ normals[i] > -0.5)
             mean[i] = normals[k[1]][same].sum(axis=0)
     return mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)

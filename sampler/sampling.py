@@ -71,8 +71,7 @@ def sample_body(
     repaired = mesh if isinstance(mesh, RepairedMesh) else repair_mesh(mesh, sheets)
     thickness = 2.0 * radius if thickness is None else thickness
     closed, owner = closed_triangles(repaired, thickness)
-    rough = float(Surface.areas_of(closed).sum())
-    fine = _spacing(radius, spacing, count, grain, rough)
+    fine = _spacing(radius, spacing, count, grain, closed)
     around = Surface(closed, device)
     free, parent, layers = free_triangles(closed, around, fine)
     solid = around
@@ -88,6 +87,7 @@ def sample_body(
             free = np.concatenate([free_triangles(solid.triangles, solid, fine)[0], sheet])
     if not len(free):
         raise MeshError("mesh: no part of its surface has an outside; check its orientation")
+    fine = _spacing(radius, spacing, count, grain, free)
     skin = Skin(touchable_parts(free, solid, fine), device)
     area = float(skin.areas.sum())
     for attempt in range(_TRIES):
@@ -164,11 +164,11 @@ def thinnest_wall(surface: Surface) -> float:
     return float(way[opposed].min() + step) if opposed.any() else float("inf")
 
 
-def _spacing(radius, spacing, count, grain, area) -> float:
+def _spacing(radius, spacing, count, grain, triangles) -> float:
     if count is not None:
         if spacing is not None:
             raise MeshError("give either the spacing or the count of the particles, not both")
-        return lattice_spacing(area, count)
+        return lattice_spacing(float(Surface.areas_of(triangles).sum()), count)
     fine = SPACING * radius if spacing is None else spacing
     return fine if grain is None else min(fine, _CLOSED * (radius + grain) / _COVERED)
 

@@ -13,7 +13,9 @@ _ISLAND = 1.5  # triangles longer than this are halved, others cut along the pla
 _NARROW = 1e-7  # of the diagonal: narrower triangles have no normal in single precision
 _THIRDS = (np.ones((3, 3)) + 3.0 * np.eye(3)) / 6.0  # places of a triangle, the middles of parts of it
 _MIDDLE = np.array([[0.36, 0.34, 0.3], [0.31, 0.36, 0.33]])  # near its middle, but hardly on edges of others
-_SLIT = 0.1  # longest edge of the pieces that slits are cut into, in spacings
+_SLIT, _LARGE = 0.1, 0.5  # longest edge of the pieces at the ends of slits, and of those inside or beside them, in spacings
+_WIDE = 4.0  # triangles with longer edges, in roots of their area, are needles
+_SHUT = 0.005  # width of slits whose walls are no skin, in spacings
 _SPECK = 0.01  # area of a speck, in squared spacings
 _MOST, _FINEST = 10, 0.5  # cuts per particle to come, after which only triangles longer than so many spacings are cut
 
@@ -22,8 +24,9 @@ class Skin(Surface):
     """Triangles with what random sampling and Warp kernels need."""
 
     def places(self, number: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """Random places, so many over the area and as many over the longest edges, so that narrow strips get their share."""
-        both = self.sample(number, random), self.sample(number, random, _longest_edges(self.triangles))
+        """Random places, so many over the area and as many over the longest edges, so that strips and specks get their share."""
+        edge = _longest_edges(self.triangles)
+        both = self.sample(number, random), self.sample(number, random, edge + edge.mean())
         return tuple(np.concatenate(pair) for pair in zip(*both, strict=True))
 
     def sample(self, number: int, random: np.random.Generator, weight: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -125,25 +128,30 @@ def _folds(triangles: np.ndarray, solid: Surface) -> np.ndarray:
 
 def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.ndarray:
     """Triangles without those parts before which there is no room; slits that narrow do not end where a plane could cut."""
+    step = max(_STEP, _SHUT * spacing / solid.unit)
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
-    if np.all(np.abs(winding_before(places, normals, solid)) < 0.5):
+    if np.all(np.abs(winding_before(places, normals, solid, step)) < 0.5):
         return triangles
-    large = _longest_edges(triangles) > _SLIT * spacing
-    kept, triangles, first = [triangles[~large]], triangles[large], True
-    while len(triangles):
-        free = _room(triangles, _THIRDS, solid).sum(axis=1)
-        kept.append(triangles[(free == 3) | (first & (free == 0))])  # the latter were judged free all the same
-        triangles, first = _halve(triangles[(free > 0) & (free < 3)]), False
-        large = _longest_edges(triangles) > _SLIT * spacing
-        small, triangles = triangles[~large], triangles[large]
-        kept.append(small[_room(small, np.full((1, 3), 1.0 / 3.0), solid)[:, 0]])
-    return np.concatenate(kept)
+    judged = _room(triangles, _THIRDS.mean(axis=0)[None], solid, _STEP)[:, 0]  # the others were judged free all the same
+    pieces, parent, whole = triangles[judged], np.flatnonzero(judged), np.ones(len(triangles), bool)
+    parts = [(triangles[:0], parent[:0])]
+    while len(pieces):
+        size = np.minimum(_longest_edges(pieces), _WIDE * np.sqrt(Surface.areas_of(pieces)))  # needles would become very many
+        small, room = size <= _LARGE * spacing, np.ones(len(pieces), int)
+        room[small] = _room(pieces[small], _THIRDS, solid, step).sum(axis=1)
+        done = small & ((room % 3 == 0) | (size <= _SLIT * spacing))
+        stays = done & (room >= 2)
+        whole[parent[done & ~stays]] = False
+        parts.append((pieces[stays], parent[stays]))
+        pieces, parent = _halve(pieces[~done]), np.tile(parent[~done], 2)
+    pieces, parent = map(np.concatenate, zip(*parts, strict=True))
+    return np.concatenate([triangles[whole], pieces[~whole[parent]]])
 
 
-def _room(triangles: np.ndarray, weights: np.ndarray, solid: Surface) -> np.ndarray:
+def _room(triangles: np.ndarray, weights: np.ndarray, solid: Surface, step: float) -> np.ndarray:
     """Whether there is room before places of triangles, given by the weights, shape (k, 3), of their corners; shape (n, k)."""
     places = np.einsum("nij,ki->nkj", triangles, weights).reshape(-1, 3)
-    before = winding_before(places, np.repeat(Surface.normals_of(triangles), len(weights), axis=0), solid)
+    before = winding_before(places, np.repeat(Surface.normals_of(triangles), len(weights), axis=0), solid, step)
     return (np.abs(before) < 0.5).reshape(-1, len(weights))
 
 
@@ -160,9 +168,9 @@ def _islands(triangles: np.ndarray, cell: float) -> np.ndarray:
     return link_items(len(key), here, found[here, which])[0][inverse]
 
 
-def winding_before(points: np.ndarray, normals: np.ndarray, around: Surface) -> np.ndarray:
-    """Winding numbers of a surface just before places on it, shape (n, 3) [m], the way their normals point."""
-    return around.winding(points + _STEP * around.unit * normals)
+def winding_before(points: np.ndarray, normals: np.ndarray, around: Surface, step: float = _STEP) -> np.ndarray:
+    """Winding numbers of a surface a step, of its diagonal, before places on it, shape (n, 3) [m], as their normals point."""
+    return around.winding(points + step * around.unit * normals)
 
 
 def _ask(points: np.ndarray, normals: np.ndarray, around: Surface) -> tuple[np.ndarray, np.ndarray]:

@@ -12,20 +12,23 @@ from sampler.surface import launch_shares
 
 _SCATTERED = 12  # random places per wanted particle
 _HALVINGS = 7  # of the range in which the distance of the first placing is sought
-_TURNS, _REFILL_TURNS = 120, 30
+_TURNS, _REFILL_TURNS = 120, 12
 _REFILLS = 16
-_SAMPLED = 40  # places per particle at which gaps are looked for
-_CONFIRMED = 80  # and where none is found, once more
+_SAMPLED = 40  # places per particle at which gaps are looked for, over the area; and as many over the edges
+_CONFIRMED = 80  # and where hardly any is left, once more
+_HARDLY, _FINE = 0.5, 0.02  # sum of faults in spacings at which that is so, and at which all is well
 _DOUBT = 0.08  # places so near to being a gap are looked at more closely, in spacings
+_WATCHED = 0.15  # and other places that were found so near to being one, the next time, too
 _CLOSER = (0.10, 0.10, 0.05, 0.05)  # how far beside them, in spacings
 _STRENGTH = 0.25  # of a push, in spacings
 _GAP, _SKIN_GAP = 0.78, 0.95  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
 _GAPS_APART = 1.2  # gaps nearer than this to a deeper one wait, in spacings
+_ROOM, _NEAR = 0.55, 0.4  # a gap is filled so far from particles of other skins, or as far as can be so near to it; in spacings
 _LEAST = 0.40  # particles nearer than this to one another are a fault, in spacings
-_LONELY = 1.09  # and those farther than this from all others get a neighbour
+_LONELY, _BESIDE = 1.09, (0.6, 1.06)  # those farther than this from all others get a neighbour, how far beside them; in spacings
 _AROUND = 4.0  # distance from a filled gap or a removed particle within which others move, in spacings
 _MEASURED = 100  # places per particle at which the result is measured
-_SPARE = 0.005  # share of the particles kept back for gaps, and share that may be added above the wanted number
+_SPARE, _MORE = 0.005, 0.009  # share of the particles kept back for gaps, and share that may be added above the wanted number
 _PATIENCE = 6  # refills without improvement after which the best is taken
 
 Observer = Callable[[np.ndarray], None]
@@ -67,28 +70,29 @@ def spread_particles(
     random = np.random.default_rng(seed)
     state = _State(skin, number, observe)
     start = number - int(_SPARE * number)
-    state.place(*_throw(skin, start, state.spacing, random), np.zeros(start, bool))
+    points, normals, state.apart = _throw(skin, start, state.spacing, random)
+    state.place(points, normals, np.zeros(start, bool))
     total = _TURNS + _REFILLS * _REFILL_TURNS
     for turn in range(_TURNS):
         state.push(_STRENGTH * (1.0 - 0.8 * turn / _TURNS))
         progress((turn + 1) / total)
-    state.crowding = state.crowd.numpy()
     state.pinned = np.zeros(start, bool)
     places = skin.places(_SAMPLED * number, random)
+    state.fixed = len(places[0])
     best, least, stuck, sure = None, np.inf, 0, False
     for turn in range(_REFILLS + 1):
         found = settle(*state.result())  # on an edge either face may be the nearest; judge by the final choice
         state.points, state.normals = skin.shift(found[0]), state.vectors(found[1])
         places, gaps, crowded, fault = state.faults(places, random)
-        if fault == 0.0 and not sure:  # a gap on a small piece may have had no place
-            fresh, gaps, crowded, fault = state.faults(skin.places(_CONFIRMED * number, random), random)
-            places, sure = _joined(places, fresh), True
+        if fault < _HARDLY and not sure:  # a gap on a small piece may have had no place
+            places, gaps, crowded, fault = state.faults(_joined(places, skin.places(_CONFIRMED * number, random)), random)
+            sure = True
         stuck = 0 if fault < least else stuck + 1
         if fault < least:
             best, least = found, fault
-        if fault == 0.0 or turn == _REFILLS or stuck == _PATIENCE:
+        if fault < _FINE or turn == _REFILLS or stuck == _PATIENCE:
             break
-        state.refill(places[0][gaps], places[1][gaps], crowded, pin=turn > 0)
+        state.refill(*gaps, crowded, pin=turn > 0)
         for k in range(_REFILL_TURNS):
             state.push(_STRENGTH * (0.6 - 0.5 * k / _REFILL_TURNS))
             progress((_TURNS + turn * _REFILL_TURNS + k) / total)
@@ -116,7 +120,7 @@ class _State:
         self.grid = wp.HashGrid(128, 128, 128, device=self.device)
         self.corners = skin.shift(skin.triangles.reshape(-1, 3))
         self.face_normals = self.vectors(skin.normals)
-        self.most = number + int(_SPARE * number)
+        self.most = number + int(_MORE * number)
 
     def vectors(self, values: np.ndarray) -> wp.array:
         return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
@@ -125,14 +129,14 @@ class _State:
         self.points, self.normals = self.skin.shift(points), self.vectors(normals)
         self.held = wp.array(held.astype(np.int32), dtype=int, device=self.device)
         self.moved, self.moved_normals = wp.empty_like(self.points), wp.empty_like(self.normals)
-        self.crowd = wp.zeros(len(points), dtype=float, device=self.device)
+        self.without = tuple(wp.zeros(len(points), dtype=float, device=self.device) for _ in range(2))
 
     def push(self, strength: float) -> None:
         h = self.unit_spacing
         self.grid.build(self.points, 2.0 * h)
         inputs = [self.grid.id, self.skin.mesh.id, self.points, self.normals, self.corners, self.face_normals, self.held]
-        outputs = [self.moved, self.moved_normals, self.crowd]
-        launch_shares(push_apart, len(self.points), [*inputs, h, strength * h], outputs, self.device)
+        outputs = [self.moved, self.moved_normals]
+        launch_shares(push_apart, len(self.points), [*inputs, h, self.apart, strength * h], outputs, self.device)
         self.points, self.moved = self.moved, self.points
         self.normals, self.moved_normals = self.moved_normals, self.normals
         if self.observe:
@@ -145,12 +149,12 @@ class _State:
         points, face = self.skin.closest(self.positions(), up=self.normals.numpy())
         return points, self.skin.normals[face]
 
-    def faults(self, places: Places, random: np.random.Generator) -> tuple[Places, np.ndarray, np.ndarray, float]:
+    def faults(self, places: Places, random: np.random.Generator) -> tuple[Places, Places, np.ndarray, float]:
         """What is wrong, judged at places with their normals.
 
         Returns:
-            More places, where it was in doubt; which of them to fill, the worst first and none near a worse one; particles too
-            near to others; the sum of all faults.
+            Places to be judged at the next time, the fixed ones and those in doubt; places to fill, the worst first and none
+            near a worse one; particles too near to others; the sum of all faults.
         """
         nearest, found = self.nearest(), self.distances(*places)
         for _ in range(2):
@@ -159,21 +163,37 @@ class _State:
         free, excess = found[0], _excess(*found)
         for i in np.flatnonzero(nearest > _LONELY):
             away = np.linalg.norm(places[0] - self.positions()[i], axis=1) / self.spacing
-            beside = np.flatnonzero((away < 1.0) & (away > 0.6))
+            beside = np.flatnonzero((away > _BESIDE[0]) & (away < _BESIDE[1]))
             if len(beside):
                 k = beside[free[beside].argmax()]
-                excess[k] = max(excess[k], nearest[i] - _LONELY)
+                excess[k] = max(excess[k], 4.0 * (nearest[i] - _LONELY))
         crowded = np.flatnonzero(nearest < _LEAST)
         crowded = crowded[np.lexsort((nearest[crowded], self.pinned[crowded]))]
         chosen: list[int] = []
-        left = np.argsort(-excess, kind="stable")[: np.count_nonzero(excess > 0.0) + len(self.points)]
+        enough = min(len(excess), np.count_nonzero(excess > 0.0) + (len(self.points) if len(crowded) else 1))
+        left = np.argpartition(-excess, enough - 1)[:enough]
+        left = left[np.argsort(-excess[left], kind="stable")]
         while len(left) and len(chosen) < (max(4, len(self.points) // 20) if excess[left[0]] > 0.0 else len(crowded) / 2):
             chosen.append(int(left[0]))
             left = left[np.linalg.norm(places[0][left] - places[0][left[0]], axis=1) > _GAPS_APART * self.spacing]
         gaps = np.array(chosen, int)
         open_ = np.maximum(free[gaps] - _GAP, 0.0).sum()
         fault = float(4.0 * open_ + np.maximum(excess[gaps], 0.0).sum() + (_LEAST - nearest[crowded]).sum())
-        return places, gaps, crowded, fault
+        fill = self._roomiest(places, gaps, *found)
+        watched = (np.arange(len(excess)) < self.fixed) | (excess > -_WATCHED)
+        return _at(places, watched), _at(places, fill), crowded, fault
+
+    def _roomiest(self, places: Places, gaps: np.ndarray, free: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """Gaps, or in place of those with a particle of another skin behind them, places beside them that are farther from it."""
+        roomy = np.flatnonzero((free > _ROOM) & (own > _ROOM))
+        chosen = gaps.copy()
+        for n, k in enumerate(gaps):
+            if free[k] < _ROOM:
+                near = np.linalg.norm(places[0][roomy] - places[0][k], axis=1) < _NEAR * self.spacing
+                near = roomy[near & (places[1][roomy] @ places[1][k] > 0.5)]
+                if len(near):
+                    chosen[n] = near[free[near].argmax()]
+        return chosen
 
     def _beside(self, places: Places, doubtful: np.ndarray, random: np.random.Generator) -> Places:
         """Places a little aside of doubtful ones."""
@@ -183,12 +203,15 @@ class _State:
         return points, self.skin.normals[face]
 
     def distances(self, places: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Distance of places from the nearest particle and from the nearest on their own skin, at most 2; in spacings."""
+        """Distance of places from the nearest particle and from the nearest on their own skin, at most 2; in spacings.
+
+        Notes how far they would be without it.
+        """
         reach = 2.0 * self.unit_spacing
         self.grid.build(self.points, 0.5 * reach)
         found = tuple(wp.empty(len(places), dtype=float, device=self.device) for _ in range(2))
         inputs = [self.grid.id, self.points, self.normals, self.skin.shift(places), self.vectors(normals), reach]
-        launch_shares(find_gaps, len(places), inputs, list(found), self.device)
+        launch_shares(find_gaps, len(places), inputs, [*found, *self.without], self.device)
         return tuple(values.numpy() / self.unit_spacing for values in found)
 
     def nearest(self) -> np.ndarray:
@@ -200,14 +223,15 @@ class _State:
         return nearest.numpy() / self.unit_spacing
 
     def refill(self, places: np.ndarray, normals: np.ndarray, crowded: np.ndarray, pin: bool) -> None:
-        """Move particles that are too near to others, and the most crowded ones, into gaps; pinned ones stay there.
+        """Move particles that are too near to others, and those that are missed the least, into gaps; pinned ones stay there.
 
         Only what is near moves afterwards.
         """
         points, up = self.positions(), self.normals.numpy()
         taken: list[int] = []
         added = max(0, min(self.most - len(points), len(places)))
-        for rank, k in enumerate([*crowded, *np.argsort(-self.crowding, kind="stable")]):
+        missed = _excess(*(far.numpy() / self.unit_spacing for far in self.without))
+        for rank, k in enumerate([*crowded, *np.argsort(missed, kind="stable")]):
             if len(taken) == len(places) or (rank >= len(crowded) and len(taken) >= len(places) - added):
                 break
             way = np.linalg.norm(np.concatenate([places, points[taken]]) - points[k], axis=1).min()
@@ -219,12 +243,15 @@ class _State:
         keep = np.ones(len(points), bool)
         keep[taken] = False
         points, up = np.concatenate([points[keep], places]), np.concatenate([up[keep], normals])
-        self.crowding = np.concatenate([self.crowding[keep], np.zeros(len(places))])
         self.pinned = np.concatenate([self.pinned[keep], np.full(len(places), pin)])
         moving = np.zeros(len(points), bool)
         for place in changed:
             moving |= np.linalg.norm(points - place, axis=1) < _AROUND * self.spacing
         self.place(points, up, self.pinned | ~moving)
+
+
+def _at(places: Places, which: np.ndarray) -> Places:
+    return places[0][which], places[1][which]
 
 
 def _joined(*pairs: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -236,8 +263,8 @@ def _excess(free: np.ndarray, own: np.ndarray) -> np.ndarray:
     return np.maximum(free - _GAP, own - _SKIN_GAP)
 
 
-def _throw(skin: Skin, number: int, spacing: float, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """So many random places as far apart as a halving search finds, first come first kept."""
+def _throw(skin: Skin, number: int, spacing: float, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float]:
+    """So many random places as far apart as a halving search finds, first come first kept; and how far, in the kernels' units."""
     points, normals = skin.sample(_SCATTERED * number, random)
     order = random.permutation(len(points))
     points, normals = points[order], normals[order]
@@ -255,4 +282,4 @@ def _throw(skin: Skin, number: int, spacing: float, random: np.random.Generator)
         low, high = (share, high) if enough else (low, share)
         best = kept.numpy() == 1 if enough else best
     chosen = np.flatnonzero(best)[:number]
-    return points[chosen], normals[chosen]
+    return points[chosen], normals[chosen], low * spacing / skin.unit

@@ -8,9 +8,19 @@ MODULE = "sampler_spreading"
 
 _SAME = wp.constant(-0.2)  # cosine between normals from which two places lie on one skin
 _OTHER = wp.constant(-0.7)  # and below which they lie on different skins
-_ACROSS = wp.constant(0.8)  # range of the repulsion between skins, of that on one skin
-_CORE, _HARD = wp.constant(8.0), wp.constant(0.6)  # strength and range, in spacings, of what keeps particles apart in any case
+_SEEN = wp.constant(5.0e-5)  # least width of a gap
+_NARROW = wp.constant(0.05)  # gaps narrower than this count as closed, so that either skin's particles cover both; in spacings
+_THROWN = wp.constant(0.85)  # how near to each other particles of different skins may be thrown, of those on one skin
+_CORE, _HARD = wp.constant(8.0), wp.constant(1.25)  # what holds particles apart: strength, and range, of how far they were thrown
 _FARTHEST = wp.constant(0.3)  # of a step, in spacings
+
+
+@wp.func
+def facing(between: wp.vec3, up: wp.vec3, other: wp.vec3, gap: float) -> bool:
+    """Whether two places, given the way from the first to the second, look at each other across a gap at most so wide."""
+    forth = wp.dot(between, up)
+    back = -wp.dot(between, other)
+    return wp.min(forth, back) > _SEEN and wp.max(forth, back) < gap
 
 
 @wp.func
@@ -21,10 +31,10 @@ def same_skin(a: wp.vec3, b: wp.vec3) -> float:
 
 
 @wp.func
-def way_along(p: wp.vec3, up: wp.vec3, q: wp.vec3, other: wp.vec3) -> float:
-    """Distance between places of a surface: straight on one skin, else around the edge in which their planes meet."""
+def way_along(p: wp.vec3, up: wp.vec3, q: wp.vec3, other: wp.vec3, gap: float) -> float:
+    """Distance between places of a surface: straight on one skin or across a narrow gap, else around the edge of their planes."""
     between = q - p
-    if wp.dot(up, other) >= _SAME:
+    if wp.dot(up, other) >= _SAME or facing(between, up, other, gap):
         return wp.length(between)
     edge = wp.cross(up, other)
     square = wp.length_sq(edge)
@@ -55,13 +65,13 @@ def push_apart(
     face_normals: wp.array(dtype=wp.vec3),
     held: wp.array(dtype=int),
     spacing: float,
+    apart: float,
     strength: float,
     first: int,
     moved: wp.array(dtype=wp.vec3),
     moved_normals: wp.array(dtype=wp.vec3),
-    crowding: wp.array(dtype=float),
 ):
-    """Push each point away from its neighbours, less so from those on another skin, and bring it back to the surface."""
+    """Push each point away from its neighbours, also through a wall, and bring it back to the surface."""
     i = first + wp.tid()
     here = points[i]
     up = normals[i]
@@ -70,19 +80,13 @@ def push_apart(
     if held[i] != 0:
         return
     push = wp.vec3(0.0)
-    crowd = float(0.0)
     for j in wp.hash_grid_query(grid, here, 2.0 * spacing):
         if j != i:
             away = here - points[j]
             distance = wp.length(away)
             if distance < 2.0 * spacing:
-                same = same_skin(up, normals[j])
-                # The two skins of a thin wall only keep their particles from lying on top of one another.
-                weight = repulsion(distance, spacing * (_ACROSS + (1.0 - _ACROSS) * same))
-                weight += _CORE * wp.max(_HARD - distance / spacing, 0.0)
-                crowd += same * weight
+                weight = repulsion(distance, spacing) + _CORE * wp.max(_HARD * apart - distance, 0.0) / spacing
                 push += away * (weight / wp.max(distance, 1.0e-3 * spacing))
-    crowding[i] = crowd
     step = push * strength
     step *= wp.min(1.0, _FARTHEST * spacing / wp.max(wp.length(step), 1.0e-12))
     there = here + step
@@ -145,11 +149,32 @@ def throw_darts(
                 if kept[j] == 1:
                     distance = wp.length(points[j] - here)
                     same = same_skin(normals[i], normals[j])
-                    if distance < apart * (0.5 + 0.5 * same):
+                    if distance < apart * (_THROWN + (1.0 - _THROWN) * same):
                         free = 0
             if free == 1:
                 kept[i] = 1
                 number += 1
+
+
+@wp.struct
+class Nearest:
+    """A particle, how far it is, and how far the next one."""
+
+    which: int
+    way: float
+    next: float
+
+
+@wp.func
+def nearer(nearest: Nearest, which: int, way: float) -> Nearest:
+    """The nearest of those met before and this one."""
+    if way < nearest.way:
+        nearest.next = wp.min(nearest.next, nearest.way)
+        nearest.which = which
+        nearest.way = way
+    else:
+        nearest.next = wp.min(nearest.next, way)
+    return nearest
 
 
 @wp.kernel(enable_backward=False, module=MODULE)
@@ -163,22 +188,38 @@ def find_gaps(
     first: int,
     distance: wp.array(dtype=float),
     own_distance: wp.array(dtype=float),
+    without: wp.array(dtype=float),
+    own_without: wp.array(dtype=float),
 ):
-    """Distance of samples from the nearest particle, and from the nearest one on their own skin; at most ``reach``."""
+    """Distance of samples from the nearest particle, and from the nearest one on their own skin; at most ``reach``.
+
+    For each particle also the largest such distance if it were not there, hardly more than half the reach.
+    """
     i = first + wp.tid()
     here = samples[i]
-    best = reach
-    own = reach
     near = 0.5 * reach
+    narrow = _NARROW * near  # the reach is two spacings
+    closest = Nearest(int(-1), reach, near)
+    own = Nearest(int(-1), reach, near)
     for j in wp.hash_grid_query(grid, here, near):
-        best = wp.min(best, wp.length(points[j] - here))
-        own = wp.min(own, way_along(here, sample_normals[i], points[j], normals[j]))
-    if own > near:  # next to never
+        way = wp.length(points[j] - here)
+        if way < wp.max(own.way, own.next):  # the way along the skin is no shorter
+            closest = nearer(closest, j, way)
+            own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j], narrow))
+    if own.way > near:  # next to never
+        closest = Nearest(int(-1), reach, near)
+        own = Nearest(int(-1), reach, near)
         for j in wp.hash_grid_query(grid, here, reach):
-            best = wp.min(best, wp.length(points[j] - here))
-            own = wp.min(own, way_along(here, sample_normals[i], points[j], normals[j]))
-    distance[i] = best
-    own_distance[i] = own
+            way = wp.length(points[j] - here)
+            if way < wp.max(own.way, own.next):
+                closest = nearer(closest, j, way)
+                own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j], narrow))
+    distance[i] = closest.way
+    own_distance[i] = own.way
+    if closest.which >= 0:
+        wp.atomic_max(without, closest.which, closest.next)
+    if own.which >= 0:
+        wp.atomic_max(own_without, own.which, own.next)
 
 
 @wp.kernel(enable_backward=False, module=MODULE)

@@ -64,8 +64,41 @@ def test_both_skins_of_a_plate_are_covered(share):
     body = sample_body(plate, radius=0.002, count=800)
     near = neighbours(body.points) / body.spacing
     assert skin_gap(plate, body) <= body.spacing
+    assert near.std() / near.mean() <= 0.065
     assert near.min() >= 0.35
     assert near.max() <= 1.10
+
+
+def pair_of_boxes(gap):
+    boxes = [trimesh.creation.box((0.1, 0.06, 0.02)).apply_translation([0, 0, z]) for z in (0.0, 0.02 + gap)]
+    return trimesh.util.concatenate(boxes)
+
+
+@pytest.mark.parametrize("gap", [1e-4, 2e-4, 1e-3, 3e-3])
+def test_skins_across_a_gap_are_covered_evenly(gap):
+    pair = pair_of_boxes(gap)
+    body = sample_body(pair, radius=0.002, count=800)
+    near = neighbours(body.points) / body.spacing
+    assert near.std() / near.mean() <= 0.065
+    assert near.max() <= 1.10
+    assert distances(surface_samples(pair)[0], body.points).max() <= 0.80 * body.spacing
+    if gap > 0.05 * body.spacing:
+        assert skin_gap(pair, body) <= body.spacing
+
+
+def test_skins_that_nearly_touch_share_their_particles():
+    body = sample_body(pair_of_boxes(2e-4), radius=0.002, count=800)
+    inside = np.abs(body.points[:, 2] - 0.0101) < 0.00011
+    on_top = body.points[:, 2] > 0.0301
+    assert np.count_nonzero(inside) < 1.5 * np.count_nonzero(on_top)  # each covered by itself needs twice as many
+
+
+def test_walls_beside_solids_are_as_even():
+    plate = trimesh.creation.box((0.1, 0.06, 0.0004)).apply_translation([0.079, 0, 0])
+    body = sample_body(trimesh.util.concatenate([trimesh.creation.box((0.06, 0.06, 0.06)), plate]), radius=0.002, count=1200)
+    near = neighbours(body.points) / body.spacing
+    assert near.std() / near.mean() <= 0.065
+    assert body.evenness.skin_coverage <= 1.0
 
 
 def crossing_fins():
@@ -175,9 +208,10 @@ def test_contact_normals_lean_as_much_as_is_told(grain):
     assert lean.max() >= 0.85 * body.roughness(grain)
 
 
-def test_inset_keeps_the_outer_size():
+@pytest.mark.parametrize("seed", range(4))
+def test_inset_keeps_the_outer_size(seed):
     box = trimesh.creation.box((0.1, 0.07, 0.05))
-    body = sample_body(box, radius=0.004, inset=True)
+    body = sample_body(box, radius=0.004, inset=True, seed=seed)
     out = np.abs(body.points) + body.radius - np.array([0.05, 0.035, 0.025])
     assert np.abs(out.max(axis=1)).max() < 0.02 * body.radius
     inner = trimesh.creation.box(np.array([0.1, 0.07, 0.05]) - 2.0 * body.radius)

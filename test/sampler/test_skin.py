@@ -117,15 +117,23 @@ def test_triangles_without_a_normal_are_left_out():
 
 def test_the_end_of_a_slit_is_no_skin():
     plate, lid = box((1.0, 1.0, 0.2), (0, 0, -0.1)), box((1.0, 0.8, 0.2), (0, 0, 0.1))
-    slope, step = 2e-4, 2e-5
+    slope, spacing = 1e-3, 0.05
+    width = 0.005 * spacing
     lid.vertices[:, 2] += slope * (lid.vertices[:, 0] + 0.5) * (lid.vertices[:, 2] < 0.1)  # its underside; touches at one end
     triangles = np.concatenate([plate.triangles, lid.triangles])
     solid = Surface(triangles)
-    kept = touchable_parts(free_triangles(triangles, solid, 0.05)[0], solid, 0.05)
+    kept = touchable_parts(free_triangles(triangles, solid, spacing)[0], solid, spacing)
     lost = plate.area + lid.area - Surface.areas_of(kept).sum()
-    assert lost == pytest.approx(2 * 0.8 * step * solid.unit / slope, rel=0.05)
+    assert lost == pytest.approx(2 * 0.8 * width / slope, rel=0.05)
     middle = kept.mean(axis=1)
-    assert np.mean(np.abs(winding_before(middle, Surface.normals_of(kept), solid)) > 0.5) < 0.02
+    assert np.mean(np.abs(winding_before(middle, Surface.normals_of(kept), solid, width / solid.unit)) > 0.5) < 0.02
+
+
+def test_what_lies_open_beside_a_slit_stays():
+    plate, lid = box((1.0, 1.0, 0.2), (0, 0, -0.1)), box((0.93, 0.93, 0.2), (0, 0, 0.1 + 1e-4))
+    triangles = np.concatenate([plate.triangles, lid.triangles])
+    kept = touchable_parts(triangles, Surface(triangles), 0.05)
+    assert Surface.areas_of(kept).sum() == pytest.approx(plate.area + lid.area - 2 * 0.93**2, rel=0.01)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
