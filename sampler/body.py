@@ -78,9 +78,10 @@ class ParticleBody:
         """Largest angle [rad] between the normal of a contact with a grain of this radius [m] and that of the surface.
 
         On a flat face a grain that touches a particle from a place at distance ``R_c`` from it leans by
-        ``asin(R_c / (r + grain))``; ``R_c`` is at most the coverage.
+        ``asin(R_c / (r + grain))``; ``R_c`` is at most the coverage along the skin. Particles of the other skin of a wall,
+        which lie deeper, are touched from nearer places only.
         """
-        return float(np.arcsin(min(1.0, self.coverage / (self.radius + grain))))
+        return float(np.arcsin(min(1.0, self.evenness.skin_coverage * self.spacing / (self.radius + grain))))
 
     def mass_properties(self, density: float | None = None, mass: float | None = None) -> MassProperties:
         """Mass, centre and principal inertia.

@@ -208,6 +208,19 @@ def test_contact_normals_lean_as_much_as_is_told(grain):
     assert lean.max() >= 0.85 * body.roughness(grain)
 
 
+@pytest.mark.parametrize("wall", [0.0004, 0.0012, 0.0025])
+def test_on_thin_walls_too_contact_normals_lean_no_more_than_is_told(wall):
+    grain = 0.004
+    body = sample_body(trimesh.creation.box((0.1, 0.1, wall)), radius=0.003)
+    places = np.random.default_rng(0).uniform(-0.045, 0.045, (20000, 2))
+    aside = np.linalg.norm(places[:, None] - body.points[None, :, :2], axis=2)
+    reach = body.radius + grain
+    height = body.points[:, 2] + np.sqrt(np.maximum(reach**2 - aside**2, 0.0)) - np.where(aside < reach, 0.0, np.inf)
+    first = height.argmax(axis=1)  # what a grain let down there touches first, of either skin
+    lean = np.arcsin(aside[np.arange(len(places)), first] / reach)
+    assert lean.max() <= body.roughness(grain)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_inset_keeps_the_outer_size(seed):
     box = trimesh.creation.box((0.1, 0.07, 0.05))
