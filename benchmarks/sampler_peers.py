@@ -16,9 +16,10 @@ import numpy as np
 import trimesh
 
 from sampler import MeshError, read_mesh, repair_mesh, sample_body
+from sampler.gaps import measure_evenness
+from sampler.lattice import lattice_spacing
 from sampler.repair import SHEET
 from sampler.skin import Skin, free_triangles
-from sampler.spreading import lattice_spacing, measure_evenness
 from sampler.surface import Surface
 
 

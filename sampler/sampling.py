@@ -8,12 +8,14 @@ import trimesh
 
 from sampler.body import ParticleBody
 from sampler.errors import MeshError
+from sampler.gaps import measure_evenness
 from sampler.inset import inset_particles
+from sampler.lattice import lattice_spacing, particle_count
 from sampler.mass import integrate, is_physical
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
 from sampler.sheets import closed_triangles
 from sampler.skin import Skin, free_triangles, touchable_parts, winding_before
-from sampler.spreading import Observer, lattice_spacing, measure_evenness, particle_count, spread_particles
+from sampler.spreading import Observer, spread_particles
 from sampler.surface import Surface
 
 SPACING = 1.5  # default distance between neighbours in particle radii; below 2 so that particles overlap into a closed skin

@@ -1,51 +1,21 @@
-"""Kernels that move particles over a surface and measure the gaps between them; lengths in units of the mesh's diagonal."""
+"""Kernels that move particles over a surface; lengths in units of the mesh's diagonal."""
 
 import warp as wp
 
+from sampler.gap_kernels import MODULE, SAME
 from sampler.surface import ASIDE, nearest_face
 
-MODULE = "sampler_spreading"
-
-_SAME = wp.constant(-0.2)  # cosine between normals from which two places lie on one skin
-_OTHER = wp.constant(-0.7)  # and below which they lie on different skins
-_SEEN = wp.constant(5.0e-5)  # least width of a gap
-_NARROW = wp.constant(0.05)  # gaps narrower than this count as closed, so that either skin's particles cover both; in spacings
+_OTHER = wp.constant(-0.7)  # between normals below which two places lie on different skins
 _THROWN = wp.constant(0.85)  # how near to each other particles of different skins may be thrown, of those on one skin
 _CORE, _HARD = wp.constant(8.0), wp.constant(1.25)  # what holds particles apart: strength, and range, of how far they were thrown
 _FARTHEST = wp.constant(0.3)  # of a step, in spacings
 
 
 @wp.func
-def facing(between: wp.vec3, up: wp.vec3, other: wp.vec3, gap: float) -> bool:
-    """Whether two places, given the way from the first to the second, look at each other across a gap at most so wide."""
-    forth = wp.dot(between, up)
-    back = -wp.dot(between, other)
-    return wp.min(forth, back) > _SEEN and wp.max(forth, back) < gap
-
-
-@wp.func
 def same_skin(a: wp.vec3, b: wp.vec3) -> float:
     """1 for places on one skin, 0 for the two skins of a wall, smooth between."""
-    share = wp.clamp((wp.dot(a, b) - _OTHER) / (_SAME - _OTHER), 0.0, 1.0)
+    share = wp.clamp((wp.dot(a, b) - _OTHER) / (SAME - _OTHER), 0.0, 1.0)
     return share * share * (3.0 - 2.0 * share)
-
-
-@wp.func
-def way_along(p: wp.vec3, up: wp.vec3, q: wp.vec3, other: wp.vec3, gap: float) -> float:
-    """Distance between places of a surface: straight on one skin or across a narrow gap, else around the edge of their planes."""
-    between = q - p
-    if wp.dot(up, other) >= _SAME or facing(between, up, other, gap):
-        return wp.length(between)
-    edge = wp.cross(up, other)
-    square = wp.length_sq(edge)
-    if square < 1.0e-4:  # the two skins of a wall
-        return 1.0e6
-    # The line's foot f from p: f lies in both planes and (f - p) has no part along the edge.
-    to_edge = wp.cross(edge, up) * (wp.dot(between, other) / square)
-    from_edge = wp.cross(edge, other) * (wp.dot(between, up) / square)
-    along = wp.dot(between, edge)
-    across = wp.length(to_edge) + wp.length(from_edge)
-    return wp.sqrt(across * across + along * along / square)
 
 
 @wp.func
@@ -154,80 +124,3 @@ def throw_darts(
             if free == 1:
                 kept[i] = 1
                 number += 1
-
-
-@wp.struct
-class Nearest:
-    """A particle, how far it is, and how far the next one."""
-
-    which: int
-    way: float
-    next: float
-
-
-@wp.func
-def nearer(nearest: Nearest, which: int, way: float) -> Nearest:
-    """The nearest of those met before and this one."""
-    if way < nearest.way:
-        nearest.next = wp.min(nearest.next, nearest.way)
-        nearest.which = which
-        nearest.way = way
-    else:
-        nearest.next = wp.min(nearest.next, way)
-    return nearest
-
-
-@wp.kernel(enable_backward=False, module=MODULE)
-def find_gaps(
-    grid: wp.uint64,
-    points: wp.array(dtype=wp.vec3),
-    normals: wp.array(dtype=wp.vec3),
-    samples: wp.array(dtype=wp.vec3),
-    sample_normals: wp.array(dtype=wp.vec3),
-    reach: float,
-    first: int,
-    distance: wp.array(dtype=float),
-    own_distance: wp.array(dtype=float),
-    without: wp.array(dtype=float),
-    own_without: wp.array(dtype=float),
-):
-    """Distance of samples from the nearest particle, and from the nearest one on their own skin; at most ``reach``.
-
-    For each particle also the largest such distance if it were not there, hardly more than half the reach.
-    """
-    i = first + wp.tid()
-    here = samples[i]
-    near = 0.5 * reach
-    narrow = _NARROW * near  # the reach is two spacings
-    closest = Nearest(int(-1), reach, near)
-    own = Nearest(int(-1), reach, near)
-    for j in wp.hash_grid_query(grid, here, near):
-        way = wp.length(points[j] - here)
-        if way < wp.max(own.way, own.next):  # the way along the skin is no shorter
-            closest = nearer(closest, j, way)
-            own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j], narrow))
-    if own.way > near:  # next to never
-        closest = Nearest(int(-1), reach, near)
-        own = Nearest(int(-1), reach, near)
-        for j in wp.hash_grid_query(grid, here, reach):
-            way = wp.length(points[j] - here)
-            if way < wp.max(own.way, own.next):
-                closest = nearer(closest, j, way)
-                own = nearer(own, j, way_along(here, sample_normals[i], points[j], normals[j], narrow))
-    distance[i] = closest.way
-    own_distance[i] = own.way
-    if closest.which >= 0:
-        wp.atomic_max(without, closest.which, closest.next)
-    if own.which >= 0:
-        wp.atomic_max(own_without, own.which, own.next)
-
-
-@wp.kernel(enable_backward=False, module=MODULE)
-def find_nearest(grid: wp.uint64, points: wp.array(dtype=wp.vec3), reach: float, first: int, distance: wp.array(dtype=float)):
-    """Distance of each particle from its nearest neighbour, at most ``reach``."""
-    i = first + wp.tid()
-    best = reach
-    for j in wp.hash_grid_query(grid, points[i], reach):
-        if j != i:
-            best = wp.min(best, wp.length(points[j] - points[i]))
-    distance[i] = best

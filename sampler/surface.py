@@ -7,7 +7,7 @@ from functools import cache, cached_property
 import numpy as np
 import warp as wp
 
-from sampler.rays import closing_cone, count_leavings
+from sampler.rays import closing_cones, count_leavings
 
 _TOGETHER = 2000  # points below which a second core is not worth its start
 ASIDE = wp.constant(1.0e-5)  # of the diagonal: how much nearer the wrong side of a wall must be to be taken
@@ -209,7 +209,7 @@ class Surface:
     @cached_property
     def _closing(self) -> tuple["Surface | None", "Surface | None"]:
         """What closes the surface, and both together; nothing where there is too much to close."""
-        cone = closing_cone(self.triangles)
+        cone = closing_cones(self.triangles)
         if not len(cone):
             return None, self
         if len(cone) > _RAGGED * len(self.triangles):

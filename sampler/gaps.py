@@ -1,0 +1,217 @@
+"""How particles cover a surface: where gaps are, which particles are too near to others, and which would be missed the least."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from sampler.body import Evenness
+from sampler.gap_kernels import Nearest, find_gaps, find_nearest
+from sampler.lattice import lattice_spacing
+from sampler.skin import Skin
+from sampler.surface import launch_shares
+
+_DOUBT = 0.08  # places so near to being a gap are looked at more closely, in spacings
+_WATCHED = 0.15  # and other places that were found so near to being one, the next time, too
+_CLOSER = (0.10, 0.10, 0.05, 0.05)  # how far beside them, in spacings
+_GAP, _SKIN_GAP = 0.78, 0.95  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
+_GAPS_APART = 1.2  # gaps nearer than this to a deeper one wait, in spacings
+_ROOM, _NEAR = 0.55, 0.4  # a gap is filled so far from particles of other skins, or as far as can be so near to it; in spacings
+_LEAST = 0.40  # particles nearer than this to one another are a fault, in spacings
+_LONELY, _BESIDE = 1.09, (0.6, 1.06)  # those farther than this from all others get a neighbour, how far beside them; in spacings
+_MOVED, _TURNED = 1e-4, 0.999  # what has moved less, in spacings, and turned less, by the cosine, lies where it was
+_MEASURED = 100  # places per particle at which the result is measured
+
+
+@dataclass(frozen=True)
+class Places:
+    """Places on a surface and the particles nearest to them.
+
+    Attributes:
+        points: shape (n, 3) [m].
+        normals: of the surface there, shape (n, 3).
+        closest: particle nearest to each, how far it is and how far the next one; shape (n,) of ``Nearest``, in spacings.
+        own: the same along the surface.
+        fixed: places looked at every time, shape (n,).
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    closest: np.ndarray
+    own: np.ndarray
+    fixed: np.ndarray
+
+    def at(self, which: np.ndarray) -> "Places":
+        """Some of them."""
+        return Places(*(values[which] for values in vars(self).values()))
+
+    def joined(self, other: "Places") -> "Places":
+        """These and others."""
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
+        return Places(*(np.concatenate(pair) for pair in pairs))
+
+    @property
+    def excess(self) -> np.ndarray:
+        """By how much they lie in gaps, in spacings."""
+        return _excess(self.closest["way"], self.own["way"])
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is wrong with the particles.
+
+    Attributes:
+        points, normals: places to fill, the worst first and none near a worse one, shape (n, 3) [m].
+        crowded: particles too near to others.
+        missed: how far in a gap the worst place would be without each particle, in spacings.
+        fault: sum of all faults, in spacings.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    crowded: np.ndarray
+    missed: np.ndarray
+    fault: float
+
+
+class Gaps:
+    """What is known of the gaps between particles that move.
+
+    Args:
+        skin: where they lie.
+        spacing: of the particles [m].
+    """
+
+    def __init__(self, skin: Skin, spacing: float):
+        self.skin, self.spacing, self.device = skin, spacing, skin.device
+        self.grid = wp.HashGrid(128, 128, 128, device=self.device)
+        self.points = self.normals = np.empty((0, 3))
+        self.places = Places(self.points, self.normals, *np.empty((2, 0), Nearest.numpy_dtype()), np.empty(0, bool))
+
+    def look(self, points: np.ndarray, normals: np.ndarray) -> None:
+        """Take note of particles, shape (n, 3) [m], and their normals; only near those that have moved is measured anew."""
+        before = slice(len(self.points))
+        moved = np.ones(len(points), bool)
+        moved[before] = np.linalg.norm(points[before] - self.points, axis=1) > _MOVED * self.spacing
+        moved[before] |= np.einsum("ij,ij->i", normals[before], self.normals) < _TURNED
+        changed = np.concatenate([points[moved], self.points[moved[before]]])
+        self.points, self.normals = (
+            np.where(moved[:, None], now, np.concatenate([then, now[len(then) :]]))
+            for now, then in ((points, self.points), (normals, self.normals))
+        )
+        self._where, self._up = self.skin.shift(self.points), self._vectors(self.normals)
+        self.grid.build(self._where, self.spacing / self.skin.unit)
+        places = self.places
+        stale = _near_cells(places.points, changed, self.spacing) | (places.own["way"] > 1.0)  # farther ones may be anywhere
+        places.closest[stale], places.own[stale] = self._measure(places.points[stale], places.normals[stale])
+
+    def add(self, points: np.ndarray, normals: np.ndarray, fixed: bool = False) -> None:
+        """Look at more places, shape (n, 3) [m], with the normals there; for good where they are fixed, else while in doubt."""
+        fixed = np.full(len(points), fixed)
+        self.places = self.places.joined(Places(points, normals, *self._measure(points, normals), fixed))
+
+    def judge(self, pinned: np.ndarray, random: np.random.Generator) -> Verdict:
+        """Say what is wrong; of particles too near to others those that are not pinned, shape (n,), are to blame."""
+        nearest = self.neighbour_distances()
+        for _ in range(2):
+            doubtful = np.flatnonzero(self.places.excess > -_DOUBT)[: len(self.points)]
+            self.add(*self._beside(doubtful, random))
+        places, free, excess = self.places, self.places.closest["way"], self.places.excess
+        for i in np.flatnonzero(nearest > _LONELY):
+            away = np.linalg.norm(places.points - self.points[i], axis=1) / self.spacing
+            beside = np.flatnonzero((away > _BESIDE[0]) & (away < _BESIDE[1]))
+            if len(beside):
+                k = beside[free[beside].argmax()]
+                excess[k] = max(excess[k], 4.0 * (nearest[i] - _LONELY))
+        crowded = np.flatnonzero(nearest < _LEAST)
+        crowded = crowded[np.lexsort((nearest[crowded], pinned[crowded]))]
+        gaps = self._worst(excess, len(crowded))
+        open_ = np.maximum(free[gaps] - _GAP, 0.0).sum()
+        fault = float(4.0 * open_ + np.maximum(excess[gaps], 0.0).sum() + (_LEAST - nearest[crowded]).sum())
+        fill = self._roomiest(gaps)
+        verdict = Verdict(places.points[fill], places.normals[fill], crowded, self._missed(), fault)
+        self.places = places.at(places.fixed | (excess > -_WATCHED))
+        return verdict
+
+    def neighbour_distances(self) -> np.ndarray:
+        """Distance of particles from the nearest other one, at most 2; in spacings."""
+        unit = self.spacing / self.skin.unit
+        nearest = wp.empty(len(self.points), dtype=float, device=self.device)
+        launch_shares(find_nearest, len(self.points), [self.grid.id, self._where, 2.0 * unit], [nearest], self.device)
+        return nearest.numpy() / unit
+
+    def _measure(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Particles nearest to places, and along the surface."""
+        found = tuple(wp.empty(len(points), dtype=Nearest, device=self.device) for _ in range(2))
+        inputs = [self.grid.id, self._where, self._up, self.skin.shift(points), self._vectors(normals)]
+        launch_shares(find_gaps, len(points), [*inputs, self.spacing / self.skin.unit], list(found), self.device)
+        return tuple(values.numpy() for values in found)
+
+    def _missed(self) -> np.ndarray:
+        """How far in a gap the worst place would be without each particle."""
+        left = []
+        for nearest in (self.places.closest, self.places.own):
+            far, found = np.zeros(len(self.points), np.float32), nearest["which"] >= 0
+            np.maximum.at(far, nearest["which"][found], nearest["next"][found])
+            left.append(far)
+        return _excess(*left)
+
+    def _worst(self, excess: np.ndarray, crowded: int) -> np.ndarray:
+        """Places that lie in gaps, the worst first and none near a worse one, and room for half of the crowded particles."""
+        chosen: list[int] = []
+        enough = min(len(excess), np.count_nonzero(excess > 0.0) + (len(self.points) if crowded else 1))
+        left = np.argpartition(-excess, enough - 1)[:enough]
+        left = left[np.argsort(-excess[left], kind="stable")]
+        while len(left) and len(chosen) < (max(4, len(self.points) // 20) if excess[left[0]] > 0.0 else crowded / 2):
+            chosen.append(int(left[0]))
+            away = np.linalg.norm(self.places.points[left] - self.places.points[left[0]], axis=1)
+            left = left[away > _GAPS_APART * self.spacing]
+        return np.array(chosen, int)
+
+    def _roomiest(self, gaps: np.ndarray) -> np.ndarray:
+        """Gaps, or in place of those with a particle of another skin behind them, places beside them that are farther from it."""
+        points, normals, free = self.places.points, self.places.normals, self.places.closest["way"]
+        roomy = np.flatnonzero((free > _ROOM) & (self.places.own["way"] > _ROOM))
+        chosen = gaps.copy()
+        for n, k in enumerate(gaps):
+            if free[k] < _ROOM:
+                near = np.linalg.norm(points[roomy] - points[k], axis=1) < _NEAR * self.spacing
+                near = roomy[near & (normals[roomy] @ normals[k] > 0.5)]
+                if len(near):
+                    chosen[n] = near[free[near].argmax()]
+        return chosen
+
+    def _beside(self, doubtful: np.ndarray, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+        """Places a little aside of doubtful ones."""
+        points, normals = (np.tile(x[doubtful], (len(_CLOSER), 1)) for x in (self.places.points, self.places.normals))
+        aside = np.repeat(_CLOSER, len(doubtful))[:, None] * self.spacing * random.standard_normal(points.shape)
+        points, face = self.skin.closest(points + aside, up=normals)
+        return points, self.skin.normals[face]
+
+    def _vectors(self, values: np.ndarray) -> wp.array:
+        return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
+
+
+def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Evenness:
+    """Measure particles, shape (n, 3) [m], with their normals, on the surface they lie on."""
+    gaps = Gaps(skin, lattice_spacing(float(skin.areas.sum()), len(points)))
+    gaps.look(points, normals)
+    gaps.add(*skin.places(_MEASURED * len(points), np.random.default_rng(1)))
+    nearest, free, own = gaps.neighbour_distances(), gaps.places.closest["way"], gaps.places.own["way"]
+    variation = nearest.std() / nearest.mean()
+    return Evenness(*map(float, (variation, nearest.min(), nearest.max(), free.max(), own.max())))
+
+
+def _excess(free: np.ndarray, own: np.ndarray) -> np.ndarray:
+    return np.maximum(free - _GAP, own - _SKIN_GAP)
+
+
+def _near_cells(points: np.ndarray, others: np.ndarray, cell: float) -> np.ndarray:
+    """Whether points, shape (n, 3) [m], lie in cells of a grid, so wide [m], that others lie in, or beside them; shape (n,)."""
+    if not len(points) or not len(others):
+        return np.zeros(len(points), bool)
+    low = np.minimum(points.min(axis=0), others.min(axis=0)) - 2.0 * cell
+    size = ((np.maximum(points.max(axis=0), others.max(axis=0)) - low) / cell).astype(np.int64) + 3
+    where, around = (np.ravel_multi_index(((x - low) / cell).astype(np.int64).T, size) for x in (points, others))
+    steps = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ [size[1] * size[2], size[2], 1]
+    return np.isin(where, np.unique(around)[:, None] + steps)

@@ -1,0 +1,54 @@
+"""Gaps between particles, and what a particle is needed for, against NumPy; also after some of them have moved."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from sampler.gaps import Gaps
+from sampler.lattice import lattice_spacing
+from sampler.skin import Skin
+
+
+def plane_gaps(number):
+    plane = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    return Gaps(Skin(np.asarray(plane.triangles)), lattice_spacing(1.0, number))
+
+
+def scatter(random, number):
+    return np.column_stack([random.random((number, 2)), np.zeros(number)]), np.tile([0.0, 0.0, 1.0], (number, 1))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_what_is_left_open_without_a_particle(seed):
+    random = np.random.default_rng(seed)
+    gaps, (points, up), (places, flat) = plane_gaps(150), scatter(random, 150), scatter(random, 4000)
+    gaps.look(points, up)
+    gaps.add(places, flat, fixed=True)
+    far = np.linalg.norm(places[:, None] - points, axis=2) / gaps.spacing
+    nearest, (first, second) = far.argmin(axis=1), np.sort(far, axis=1)[:, :2].T
+    without = np.zeros(len(points))
+    np.maximum.at(without, nearest, second)
+    near = without < 1.0  # farther ones are told to be at least that far
+    for found in (gaps.places.closest, gaps.places.own):
+        assert found["way"] == pytest.approx(np.minimum(first, 2.0), abs=1e-5)
+        assert np.array_equal(found["which"][first < 2.0], nearest[first < 2.0])
+        told = np.zeros(len(points))
+        np.maximum.at(told, found["which"][first < 2.0], found["next"][first < 2.0])
+        assert told[near] == pytest.approx(without[near], abs=1e-5)
+        assert np.all(told[~near] > 1.0 - 1e-5)
+
+
+def test_what_moves_is_measured_anew():
+    random = np.random.default_rng(2)
+    gaps, (points, up) = plane_gaps(400), scatter(random, 380)
+    gaps.look(points, up)
+    gaps.add(*scatter(random, 3000), fixed=True)
+    for moved in (3, 40, 0):
+        where, _ = scatter(random, moved)
+        points = points.copy()
+        points[random.permutation(len(points))[:moved]] = where
+        points = np.concatenate([points, scatter(random, 2)[0]])
+        gaps.look(points, np.tile(up[0], (len(points), 1)))
+        first = np.linalg.norm(gaps.places.points[:, None] - points, axis=2).min(axis=1) / gaps.spacing
+        assert gaps.places.closest["way"] == pytest.approx(np.minimum(first, 2.0), abs=1e-5)
+        assert gaps.neighbour_distances().shape == (len(points),)
