@@ -3,7 +3,8 @@
 import numpy as np
 import warp as wp
 
-from sampler.surface import Surface, launch_shares
+from sampler.launching import launch_shares
+from sampler.surface import Surface
 
 _RIM = 1.0e-6  # of the diagonal: what only meets the rim of a piece, as its neighbours do, does not count
 _PARALLEL = 0.99  # cosine of the angle between triangles from which one that does not split the other may still cover part of it

@@ -8,8 +8,8 @@ import warp as wp
 from sampler.body import Evenness
 from sampler.gap_kernels import Nearest, find_gaps, find_nearest
 from sampler.lattice import lattice_spacing
+from sampler.launching import launch_shares
 from sampler.skin import Skin
-from sampler.surface import launch_shares
 
 _DOUBT = 0.08  # places so near to being a gap are looked at more closely, in spacings
 _WATCHED = 0.15  # and other places that were found so near to being one, the next time, too

@@ -93,6 +93,7 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     sewn = sew_edges(vertices, faces)
     report.steps["edges sewn"] = int((sewn != np.arange(len(sewn))).sum())
     if report.steps["edges sewn"]:
+        vertices = _meet(vertices, sewn)
         faces = _drop(sewn[faces], report)
     faces, component, piece, report.steps["faces turned"], clashes = agree_faces(vertices, faces)
     caps, owner, corners = close_holes(vertices, faces, component)
@@ -121,6 +122,12 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     large = Surface.areas_of(vertices[caps[keep & (corners > 3)]]).sum()
     _warn(report, float(large / area.sum()), int((keep & (corners > 3)).sum()), clashes)
     return RepairedMesh(vertices, faces, kind, component, not enclosing, report)
+
+
+def _meet(vertices: np.ndarray, joined: np.ndarray) -> np.ndarray:
+    """Vertices, moved half-way to those they are joined with."""
+    number = np.maximum(np.bincount(joined, minlength=len(vertices)), 1)[:, None]
+    return np.stack([np.bincount(joined, x, len(vertices)) for x in vertices.T], axis=1) / number
 
 
 def _drop(faces: np.ndarray, report: RepairReport) -> np.ndarray:

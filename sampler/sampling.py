@@ -13,7 +13,7 @@ from sampler.inset import inset_particles
 from sampler.lattice import lattice_spacing, particle_count
 from sampler.mass import integrate, is_physical
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
-from sampler.sheets import closed_triangles
+from sampler.sheets import beyond_rims, closed_triangles
 from sampler.skin import Skin, free_triangles, touchable_parts, winding_before
 from sampler.spreading import Observer, spread_particles
 from sampler.surface import Surface
@@ -76,12 +76,13 @@ def sample_body(
     fine = _spacing(radius, spacing, count, grain, closed)
     around = Surface(closed, device)
     free, parent, layers = free_triangles(closed, around, fine)
-    solid = around
+    solid, rimmed = around, np.zeros((0, 3), int)
     warnings = list(repaired.report.warnings)
     volume, centre, inertia = _mass(closed, free, parent, layers, around, warnings)
     if thickness <= 2.0 * radius and np.any(owner == SHEET):
         # One layer in the sheets; the skin of the solids ends only where it is buried in other solids.
-        free = repaired.triangles[repaired.kind == SHEET]
+        rimmed = repaired.faces[repaired.kind == SHEET]
+        free = repaired.vertices[rimmed]
         solid = None
         if np.any(owner != SHEET):
             solid = Surface(closed[owner != SHEET], device)
@@ -101,7 +102,8 @@ def sample_body(
             )
         h = lattice_spacing(area, number)
         settle = partial(_clear_creases, skin=skin, solid=solid, spacing=h) if solid else lambda *placed: placed
-        points, normals = spread_particles(skin, number, seed, progress, observe, settle)
+        beyond = beyond_rims(repaired.vertices, rimmed, skin, h)
+        points, normals = spread_particles(skin, number, seed, progress, observe, settle, beyond)
         evenness = measure_evenness(skin, points, normals)
         h = lattice_spacing(area, len(points))
         if grain is None or evenness.coverage * h < radius + grain:

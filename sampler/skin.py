@@ -132,27 +132,27 @@ def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
     if np.all(np.abs(winding_before(places, normals, solid, step)) < 0.5):
         return triangles
-    judged = _room(triangles, _THIRDS.mean(axis=0)[None], solid, _STEP)[:, 0]  # the others were judged free all the same
-    pieces, parent, whole = triangles[judged], np.flatnonzero(judged), np.ones(len(triangles), bool)
-    parts = [(triangles[:0], parent[:0])]
+    before = triangles.mean(axis=1) + _STEP * solid.unit * Surface.normals_of(triangles)
+    judged = np.abs(solid.winding(before, rough=True)) < 0.5  # the others were judged free all the same
+    pieces, parent, outside = triangles[judged], np.flatnonzero(judged), before[judged]
+    whole, parts = np.ones(len(triangles), bool), [(triangles[:0], parent[:0])]
     while len(pieces):
         size = np.minimum(_longest_edges(pieces), _WIDE * np.sqrt(Surface.areas_of(pieces)))  # needles would become very many
         small, room = size <= _LARGE * spacing, np.ones(len(pieces), int)
-        room[small] = _room(pieces[small], _THIRDS, solid, step).sum(axis=1)
+        room[small] = _room(pieces[small], outside[small], solid, step).sum(axis=1)
         done = small & ((room % 3 == 0) | (size <= _SLIT * spacing))
         stays = done & (room >= 2)
         whole[parent[done & ~stays]] = False
         parts.append((pieces[stays], parent[stays]))
-        pieces, parent = _halve(pieces[~done]), np.tile(parent[~done], 2)
+        pieces, parent, outside = _halve(pieces[~done]), np.tile(parent[~done], 2), np.tile(outside[~done], (2, 1))
     pieces, parent = map(np.concatenate, zip(*parts, strict=True))
     return np.concatenate([triangles[whole], pieces[~whole[parent]]])
 
 
-def _room(triangles: np.ndarray, weights: np.ndarray, solid: Surface, step: float) -> np.ndarray:
-    """Whether there is room before places of triangles, given by the weights, shape (k, 3), of their corners; shape (n, k)."""
-    places = np.einsum("nij,ki->nkj", triangles, weights).reshape(-1, 3)
-    before = winding_before(places, np.repeat(Surface.normals_of(triangles), len(weights), axis=0), solid, step)
-    return (np.abs(before) < 0.5).reshape(-1, len(weights))
+def _room(triangles: np.ndarray, outside: np.ndarray, solid: Surface, step: float) -> np.ndarray:
+    """Whether there is room before the middles of three parts of triangles, as there is at points near them; shape (n, 3)."""
+    places = np.einsum("nij,ki->nkj", triangles, _THIRDS) + step * solid.unit * Surface.normals_of(triangles)[:, None]
+    return (solid.leavings(np.repeat(outside, 3, axis=0), places.reshape(-1, 3)) == 0).reshape(-1, 3)
 
 
 def _islands(triangles: np.ndarray, cell: float) -> np.ndarray:
@@ -169,8 +169,8 @@ def _islands(triangles: np.ndarray, cell: float) -> np.ndarray:
 
 
 def winding_before(points: np.ndarray, normals: np.ndarray, around: Surface, step: float = _STEP) -> np.ndarray:
-    """Winding numbers of a surface a step, of its diagonal, before places on it, shape (n, 3) [m], as their normals point."""
-    return around.winding(points + step * around.unit * normals)
+    """Rough winding numbers of a surface a step, of its diagonal, before places on it, shape (n, 3) [m], along their normals."""
+    return around.winding(points + step * around.unit * normals, rough=True)
 
 
 def _ask(points: np.ndarray, normals: np.ndarray, around: Surface) -> tuple[np.ndarray, np.ndarray]:

@@ -7,16 +7,16 @@ import warp as wp
 
 from sampler.gaps import Gaps, Verdict
 from sampler.lattice import lattice_spacing
+from sampler.launching import launch_shares
 from sampler.skin import Skin
-from sampler.spreading_kernels import push_apart, throw_darts
-from sampler.surface import launch_shares
+from sampler.spreading_kernels import BEYOND, FREE, HELD, push_apart, throw_darts
 
 _SCATTERED = 12  # random places per wanted particle
 _HALVINGS = 7  # of the range in which the distance of the first placing is sought
 _TURNS, _REFILL_TURNS = 120, 12
 _REFILLS = 16
 _SAMPLED = 40  # places per particle at which gaps are looked for, over the area; and as many over the edges
-_CONFIRMED = 80  # and where hardly any is left, once more
+_CONFIRMED, _LOOKS = 80, 3  # and at fresh ones where hardly any is left, until none is found there, so often at most
 _HARDLY, _FINE = 0.5, 0.02  # sum of faults in spacings at which that is so, and at which all is well
 _STRENGTH = 0.25  # of a push, in spacings
 _AROUND = 4.0  # distance from a filled gap or a removed particle within which others move, in spacings
@@ -34,6 +34,7 @@ def spread_particles(
     progress: Callable[[float], None] = lambda share: None,
     observe: Observer | None = None,
     settle: Settler = lambda points, normals: (points, normals),
+    beyond: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Spread particles over a surface.
 
@@ -44,12 +45,13 @@ def spread_particles(
         progress: called with the share of the work done, 0 to 1.
         observe: called with the particles, shape (n, 3) [m], as they relax.
         settle: moves particles a little, given their centres and normals, before they are judged.
+        beyond: places beyond rims, shape (n, 3) [m], that hold particles back from these, as if the lattice went on there.
 
     Returns:
         Particle centres on the surface, shape (number, 3) [m], and the normals of the triangles they lie on, shape (number, 3).
     """
     random = np.random.default_rng(seed)
-    state = _State(skin, number, observe)
+    state = _State(skin, number, observe, np.empty((0, 3)) if beyond is None else beyond)
     start = number - int(_SPARE * number)
     points, normals, state.apart = _throw(skin, start, state.spacing, random)
     state.place(points, normals, np.zeros(start, bool))
@@ -59,17 +61,17 @@ def spread_particles(
         progress((turn + 1) / total)
     state.pinned = np.zeros(start, bool)
     gaps = Gaps(skin, state.spacing)
-    best, least, stuck, sure = None, np.inf, 0, False
+    best, least, stuck, looks = None, np.inf, 0, 0
     for turn in range(_REFILLS + 1):
         found = settle(*state.result())  # on an edge either face may be the nearest; judge by the final choice
         gaps.look(*found)
         if turn == 0:
             gaps.add(*skin.places(_SAMPLED * number, random), fixed=True)
         verdict = gaps.judge(state.pinned, random)
-        if verdict.fault < _HARDLY and not sure:  # a gap on a small piece may have had no place
+        if looks < _LOOKS and verdict.fault < (_FINE if looks else _HARDLY):  # a gap on a small piece may have had no place
             gaps.add(*skin.places(_CONFIRMED * number, random))
             verdict = gaps.judge(state.pinned, random)
-            sure = True
+            looks, least = looks + 1, np.inf  # what was found before had not been looked at so closely
         stuck = 0 if verdict.fault < least else stuck + 1
         if verdict.fault < least:
             best, least = found, verdict.fault
@@ -86,8 +88,8 @@ def spread_particles(
 class _State:
     """Particles on the device."""
 
-    def __init__(self, skin: Skin, number: int, observe: Observer | None):
-        self.skin, self.device, self.observe = skin, skin.device, observe
+    def __init__(self, skin: Skin, number: int, observe: Observer | None, beyond: np.ndarray):
+        self.skin, self.device, self.observe, self.beyond = skin, skin.device, observe, beyond
         self.spacing = lattice_spacing(float(skin.areas.sum()), number)
         self.unit_spacing = self.spacing / skin.unit
         self.grid = wp.HashGrid(128, 128, 128, device=self.device)
@@ -99,8 +101,11 @@ class _State:
         return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
 
     def place(self, points: np.ndarray, normals: np.ndarray, held: np.ndarray) -> None:
-        self.points, self.normals = self.skin.shift(points), self.vectors(normals)
-        self.held = wp.array(held.astype(np.int32), dtype=int, device=self.device)
+        self.number, more = len(points), len(self.beyond)
+        self.points = self.skin.shift(np.concatenate([points, self.beyond]))
+        self.normals = self.vectors(np.concatenate([normals, np.zeros((more, 3))]))
+        held = np.concatenate([np.where(held, HELD, FREE), np.full(more, BEYOND)])
+        self.held = wp.array(held, dtype=int, device=self.device)
         self.moved, self.moved_normals = wp.empty_like(self.points), wp.empty_like(self.normals)
 
     def push(self, strength: float) -> None:
@@ -115,10 +120,10 @@ class _State:
             self.observe(self.positions())
 
     def positions(self) -> np.ndarray:
-        return self.points.numpy() * self.skin.unit + self.skin.centre
+        return self.points.numpy()[: self.number] * self.skin.unit + self.skin.centre
 
     def result(self) -> tuple[np.ndarray, np.ndarray]:
-        points, face = self.skin.closest(self.positions(), up=self.normals.numpy())
+        points, face = self.skin.closest(self.positions(), up=self.normals.numpy()[: self.number])
         return points, self.skin.normals[face]
 
     def refill(self, points: np.ndarray, normals: np.ndarray, verdict: Verdict, pin: bool) -> None:

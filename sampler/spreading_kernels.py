@@ -8,6 +8,11 @@ from sampler.surface import ASIDE, nearest_face
 _OTHER = wp.constant(-0.7)  # between normals below which two places lie on different skins
 _THROWN = wp.constant(0.85)  # how near to each other particles of different skins may be thrown, of those on one skin
 _CORE, _HARD = wp.constant(8.0), wp.constant(1.25)  # what holds particles apart: strength, and range, of how far they were thrown
+FREE, HELD, BEYOND = wp.constant(0), wp.constant(1), wp.constant(2)
+_BACK, _LEVEL = (
+    wp.constant(0.33),
+    wp.constant(0.3),
+)  # strength of points beyond a rim; how far out of plane, in spacings
 _FARTHEST = wp.constant(0.3)  # of a step, in spacings
 
 
@@ -41,21 +46,29 @@ def push_apart(
     moved: wp.array(dtype=wp.vec3),
     moved_normals: wp.array(dtype=wp.vec3),
 ):
-    """Push each point away from its neighbours, also through a wall, and bring it back to the surface."""
+    """Push each point away from its neighbours, also through a wall, and bring it back to the surface.
+
+    Points that are held stay; those beyond the rim of a sheet push those that lie in about one plane with them.
+    """
     i = first + wp.tid()
     here = points[i]
     up = normals[i]
     moved[i] = here
     moved_normals[i] = up
-    if held[i] != 0:
+    if held[i] != FREE:
         return
     push = wp.vec3(0.0)
     for j in wp.hash_grid_query(grid, here, 2.0 * spacing):
         if j != i:
             away = here - points[j]
             distance = wp.length(away)
-            if distance < 2.0 * spacing:
-                weight = repulsion(distance, spacing) + _CORE * wp.max(_HARD * apart - distance, 0.0) / spacing
+            beyond = held[j] == BEYOND
+            if distance < 2.0 * spacing and not (beyond and wp.abs(wp.dot(away, up)) > _LEVEL * spacing):
+                weight = repulsion(distance, spacing)
+                if beyond:
+                    weight *= _BACK
+                else:
+                    weight += _CORE * wp.max(_HARD * apart - distance, 0.0) / spacing
                 push += away * (weight / wp.max(distance, 1.0e-3 * spacing))
     step = push * strength
     step *= wp.min(1.0, _FARTHEST * spacing / wp.max(wp.length(step), 1.0e-12))

@@ -1,16 +1,15 @@
 """Exact questions to a set of triangles: closest point, generalized winding number, rays; on the CPU's cores or a GPU."""
 
-import os
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 import warp as wp
 
-from sampler.rays import closing_cones, count_leavings
+from sampler.launching import launch_shares
+from sampler.rays import closing_cones, count_windings, leavings_between
 
-_TOGETHER = 2000  # points below which a second core is not worth its start
 ASIDE = wp.constant(1.0e-5)  # of the diagonal: how much nearer the wrong side of a wall must be to be taken
+_SURE = wp.constant(0.25)  # how near to a whole number a rough winding number is good enough
 _RAGGED = 0.5  # open edges per triangle from which solid angles are as fast
 
 
@@ -82,9 +81,9 @@ def nearest_face(id: wp.uint64, p: wp.vec3, limit: float, up: wp.vec3, aside: fl
     ...
 
 
-@wp.func_native("return wp::mesh_query_winding_number(id, p, 2.0f);")
-def winding_number(id: wp.uint64, p: wp.vec3) -> float:
-    """Generalized winding number of a mesh around a point."""
+@wp.func_native("return wp::mesh_query_winding_number(id, p, apart);")
+def winding_number(id: wp.uint64, p: wp.vec3, apart: float) -> float:
+    """Generalized winding number of a mesh around a point; triangles farther than ``apart`` times their spread are summed."""
     ...
 
 
@@ -103,10 +102,15 @@ def find_closest(
 
 
 @wp.kernel(enable_backward=False, module="sampler_surface")
-def find_winding(mesh: wp.uint64, points: wp.array(dtype=wp.vec3), first: int, number: wp.array(dtype=float)):
+def find_winding(mesh: wp.uint64, points: wp.array(dtype=wp.vec3), rough: bool, first: int, number: wp.array(dtype=float)):
     """Generalized winding number of each point (Jacobson et al. 2013; far triangles by Barill et al. 2018)."""
     i = first + wp.tid()
-    number[i] = winding_number(mesh, points[i])
+    around = float(0.5)
+    if rough:
+        around = winding_number(mesh, points[i], 1.2)  # within 0.02 to 0.07, three times as fast
+    if wp.abs(around - wp.round(around)) > _SURE:
+        around = winding_number(mesh, points[i], 2.0)
+    number[i] = around
 
 
 @wp.kernel(enable_backward=False, module="sampler_surface")
@@ -145,6 +149,7 @@ class Surface:
         self.triangles = np.asarray(triangles, float)
         low, high = self.triangles.min(axis=(0, 1)), self.triangles.max(axis=(0, 1))
         self.centre, self.unit = 0.5 * (low + high), float(np.linalg.norm(high - low))
+        self.half = 0.5 * (high - low) / self.unit
         self.areas, self.normals = self.areas_of(self.triangles), self.normals_of(self.triangles)
         self.mesh = wp.Mesh(
             points=self.shift(self.triangles.reshape(-1, 3)),
@@ -196,15 +201,20 @@ class Surface:
         nearest[found] = closest_on_triangles(points[found], self.triangles[face[found]])
         return nearest, face
 
-    def winding(self, points: np.ndarray) -> np.ndarray:
-        """Generalized winding number of points, shape (n, 3) [m]: 1 inside, 0 outside of a closed surface."""
+    def winding(self, points: np.ndarray, rough: bool = False) -> np.ndarray:
+        """Generalized winding number of points, shape (n, 3) [m]: 1 inside, 0 outside of a closed surface.
+
+        Within 0.002 on meshes with cracks; rough ones within 0.07, but for those near a half.
+        """
         cone, closed = self._closing
         if closed is None:
-            return self._solid_angles(points)
-        whole = wp.empty(len(points), dtype=int, device=self.device)
-        closed._launch(count_leavings, [closed.shift(points)], [whole])
-        number = whole.numpy().astype(np.float32)
-        return number - cone._solid_angles(points) if cone else number
+            return self._solid_angles(points, rough)
+        number = count_windings(closed.mesh, closed.half, closed.shift(points).numpy(), self.device).astype(np.float32)
+        return number - cone._solid_angles(points, rough) if cone else number
+
+    def leavings(self, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """By how much the winding number falls on ways between points, shape (n, 3) [m], through the surface; shape (n,) int."""
+        return leavings_between(self.mesh, self.shift(begin).numpy(), self.shift(end).numpy(), self.device)
 
     @cached_property
     def _closing(self) -> tuple["Surface | None", "Surface | None"]:
@@ -216,9 +226,9 @@ class Surface:
             return None, None
         return Surface(cone, self.device), Surface(np.concatenate([self.triangles, cone]), self.device)
 
-    def _solid_angles(self, points: np.ndarray) -> np.ndarray:
+    def _solid_angles(self, points: np.ndarray, rough: bool) -> np.ndarray:
         number = wp.empty(len(points), dtype=float, device=self.device)
-        self._launch(find_winding, [self.shift(points)], [number])
+        self._launch(find_winding, [self.shift(points), rough], [number])
         return number.numpy()
 
     def cast(self, points: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -231,26 +241,6 @@ class Surface:
 
     def _launch(self, kernel, inputs: list, outputs: list) -> None:
         launch_shares(kernel, len(outputs[0]), [self.mesh.id, *inputs], outputs, self.device)
-
-
-def launch_shares(kernel, number: int, inputs: list, outputs: list, device: str) -> None:
-    """Launch a kernel whose argument before the outputs is its first item; on a CPU each core takes a share of the items."""
-    cores = len(os.sched_getaffinity(0)) if str(device) == "cpu" and number >= _TOGETHER else 1
-    cuts = np.linspace(0, number, 4 * cores + 1 if cores > 1 else 2).astype(int)
-
-    def run(first, last):
-        wp.launch(kernel, dim=int(last - first), inputs=[*inputs, int(first), *outputs], device=device)
-
-    wp.load_module(kernel.module, device)
-    if cores == 1:
-        run(0, number)
-        return
-    list(_pool(cores).map(run, cuts[:-1], cuts[1:]))
-
-
-@cache
-def _pool(cores: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(cores, thread_name_prefix="sampler")
 
 
 def closest_on_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

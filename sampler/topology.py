@@ -4,6 +4,7 @@ Graph work is sequential; it runs as single-threaded Warp kernels on the CPU, ha
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import warp as wp
@@ -60,12 +61,12 @@ class Edges:
     forward: np.ndarray
     start: np.ndarray
 
-    @property
+    @cached_property
     def face(self) -> np.ndarray:
         """Triangle of each half-edge."""
         return self.half // 3
 
-    @property
+    @cached_property
     def degree(self) -> np.ndarray:
         """Triangles at each edge, shape (edges,)."""
         return np.diff(self.start)

@@ -242,6 +242,16 @@ def test_thick_sheets_get_two_skins_and_thin_ones_one_layer():
     assert thin.inertia[2, 2] == pytest.approx(thin.volume * 0.1**2 / 6.0, rel=1e-9)
 
 
+@pytest.mark.parametrize(("width", "count"), [(1.0, 400), (0.1, 400), (0.03, 60)])
+def test_particles_keep_off_the_rims_of_sheets_so_that_they_lie_as_evenly_as_on_solids(width, count):
+    plate = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, width, 0], [0, width, 0]], [[0, 1, 2], [0, 2, 3]], process=False)
+    for seed in range(3):
+        even = sample_body(plate, radius=0.01, count=count, seed=seed).evenness
+        assert even.variation < 0.035
+        assert even.farthest < 1.09
+        assert even.coverage < (0.8 if width > 0.05 else 0.95)  # a row of particles in a strip as wide as h leaves its corners
+
+
 def test_a_branching_sheet_becomes_one_closed_solid():
     corners, faces = [], []
     for angle in (0.0, 2.1, 4.2):

@@ -52,6 +52,45 @@ def test_mass_of_broken_meshes(how, volume, centre, inertia, seed):
     assert np.abs(found[2] - exact[2]).max() < inertia * np.abs(exact[2]).max()
 
 
+def loose(triangles):
+    """A mesh of triangles that share no vertices."""
+    return trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False)
+
+
+def test_cracks_are_sewn_in_their_middle():
+    ball, gap = wavy_ball(3), 1e-5
+    triangles = np.array(ball.triangles)
+    far = triangles.mean(axis=1)[:, 0] > 0.0
+    triangles[far, :, 0] += gap
+    repaired = repair_mesh(loose(triangles))
+    assert repaired.report.steps["edges sewn"] > 0
+    rim = np.intersect1d(*(ball.faces[side] for side in (far, ~far)))
+    expected = np.sort(ball.vertices[rim][:, 0] + 0.5 * gap)
+    off = np.abs(repaired.vertices[np.unique(repaired.faces)][:, 0][:, None] - expected).min(axis=0)
+    assert off.max() < 1e-12
+
+
+@pytest.mark.parametrize("share", [0.01, 0.04])
+def test_needles_that_fell_apart_are_not_sewn_flat(share):
+    pipe = trimesh.creation.cylinder(radius=0.1, height=5.0, sections=64)
+    triangles = np.array(pipe.triangles)
+    triangles += share * (triangles.mean(axis=1, keepdims=True) - triangles)
+    repaired = repair_mesh(loose(triangles))
+    assert repaired.report.steps["degenerate faces dropped"] == 0
+    assert integrate(repaired.triangles)[0] == pytest.approx(pipe.volume, rel=1.2 * share)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cracks_of_a_ten_thousandth_cost_hardly_any_volume(seed):
+    pipe = trimesh.creation.annulus(0.4, 0.5, 1.0, sections=64)
+    triangles = np.array(pipe.triangles)
+    triangles += np.random.default_rng(seed).uniform(-1e-4, 1e-4, triangles.shape) * np.linalg.norm(pipe.extents)
+    repaired = repair_mesh(loose(triangles))
+    assert repaired.closed
+    assert not repaired.report.steps["sheets"]
+    assert integrate(repaired.triangles)[0] == pytest.approx(pipe.volume, rel=1e-3)
+
+
 def test_every_step_is_counted():
     box = trimesh.creation.box((1.0, 1.0, 1.0))
     faces = np.concatenate([box.faces, box.faces[:2], box.faces[2:3, ::-1], [[0, 0, 1]]])

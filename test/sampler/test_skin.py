@@ -6,6 +6,7 @@ import trimesh
 from shapes import solid_angle_inside
 
 from sampler.mass import integrate
+from sampler.rays import closing_cones
 from sampler.skin import Skin, free_triangles, touchable_parts, winding_before
 from sampler.spreading import spread_particles
 from sampler.surface import Surface
@@ -65,6 +66,39 @@ def test_winding_numbers_of_closed_surfaces_are_whole():
     points = off_surface(surface, np.random.default_rng(0).uniform(-1.5, 2.5, (3000, 3)))
     exact = np.sum([solid_angle_inside(np.asarray(ball.triangles), points) for ball in balls], axis=0)
     assert np.array_equal(surface.winding(points), exact)
+
+
+def test_winding_numbers_of_boxes_in_one_another_count_them():
+    random = np.random.default_rng(3)
+    centres, extents = random.uniform(-1.0, 1.0, (12, 3)), random.uniform(0.2, 2.0, (12, 3))
+    boxes = [box(e, c).subdivide().subdivide() for c, e in zip(centres, extents, strict=True)]
+    surface = Surface(np.concatenate([part.triangles for part in boxes]))
+    for number in (10, 1000, 50000):
+        points = off_surface(surface, random.uniform(-2.5, 2.5, (number, 3)))
+        inside = np.all(np.abs(points[:, None] - centres) < 0.5 * extents, axis=2).sum(axis=1)
+        assert np.array_equal(surface.winding(points), inside)
+
+
+def test_ways_through_a_surface_lower_the_winding_number():
+    random = np.random.default_rng(4)
+    surface = Surface(np.concatenate([box((1.0, 1.0, 1.0), (x, 0, 0)).triangles for x in (0.0, 0.3)]))
+    begin, end = (random.uniform(-1.0, 1.0, (4000, 3)) for _ in range(2))
+    assert np.array_equal(surface.leavings(begin, end), surface.winding(begin) - surface.winding(end))
+    assert not surface.leavings(begin, begin).any()
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3])
+def test_cones_close_any_surface(share):
+    random = np.random.default_rng(5)
+    ball = trimesh.creation.icosphere(4)
+    triangles = np.asarray(ball.triangles)[random.random(len(ball.faces)) > share]
+    both = np.concatenate([triangles, closing_cones(triangles)])
+    points = random.uniform(-1.2, 1.2, (300, 3))
+    a, b, c = (both[None, :, k] - points[:, None] for k in range(3))
+    la, lb, lc = (np.linalg.norm(x, axis=2) for x in (a, b, c))
+    bottom = la * lb * lc + (a * b).sum(2) * lc + (b * c).sum(2) * la + (c * a).sum(2) * lb
+    turns = np.arctan2(np.einsum("ijk,ijk->ij", a, np.cross(b, c)), bottom).sum(axis=1) / (2.0 * np.pi)
+    assert turns == pytest.approx(np.round(turns), abs=1e-9)
 
 
 def test_winding_numbers_of_open_surfaces_are_their_solid_angles():

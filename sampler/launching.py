@@ -1,0 +1,30 @@
+"""Launching a kernel on all cores."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+
+import numpy as np
+import warp as wp
+
+_TOGETHER = 2000  # items below which a second core is not worth its start
+
+
+def launch_shares(kernel, number: int, inputs: list, outputs: list, device: str) -> None:
+    """Launch a kernel whose argument before the outputs is its first item; on a CPU each core takes a share of the items."""
+    cores = len(os.sched_getaffinity(0)) if str(device) == "cpu" and number >= _TOGETHER else 1
+    cuts = np.linspace(0, number, 4 * cores + 1 if cores > 1 else 2).astype(int)
+
+    def run(first, last):
+        wp.launch(kernel, dim=int(last - first), inputs=[*inputs, int(first), *outputs], device=device)
+
+    wp.load_module(kernel.module, device)
+    if cores == 1:
+        run(0, number)
+        return
+    list(_pool(cores).map(run, cuts[:-1], cuts[1:]))
+
+
+@cache
+def _pool(cores: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(cores, thread_name_prefix="sampler")
