@@ -19,7 +19,7 @@ _GAPS_APART = 1.2  # gaps nearer than this to a deeper one wait, in spacings
 _ROOM, _NEAR = 0.55, 0.4  # a gap is filled so far from particles of other skins, or as far as can be so near to it; in spacings
 _LEAST = 0.40  # particles nearer than this to one another are a fault, in spacings
 _LONELY, _BESIDE = 1.09, (0.6, 1.06)  # those farther than this from all others get a neighbour, how far beside them; in spacings
-_MOVED, _TURNED = 1e-4, 0.999  # what has moved less, in spacings, and turned less, by the cosine, lies where it was
+_MOVED, _TURNED = 1e-3, 0.999  # what has moved less, in spacings, and turned less, by the cosine, lies where it was
 _MEASURED = 100  # places per particle at which the result is measured
 
 

@@ -19,7 +19,7 @@ _SAMPLED = 40  # places per particle at which gaps are looked for, over the area
 _CONFIRMED, _LOOKS = 80, 3  # and at fresh ones where hardly any is left, until none is found there, so often at most
 _HARDLY, _FINE = 0.5, 0.02  # sum of faults in spacings at which that is so, and at which all is well
 _STRENGTH = 0.25  # of a push, in spacings
-_AROUND = 4.0  # distance from a filled gap or a removed particle within which others move, in spacings
+_AROUND = 3.0  # distance from a filled gap or a removed particle within which others move, in spacings
 _SPARE, _MORE = 0.005, 0.009  # share of the particles kept back for gaps, and share that may be added above the wanted number
 _PATIENCE = 6  # refills without improvement after which the best is taken
 

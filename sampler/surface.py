@@ -151,9 +151,13 @@ class Surface:
         self.centre, self.unit = 0.5 * (low + high), float(np.linalg.norm(high - low))
         self.half = 0.5 * (high - low) / self.unit
         self.areas, self.normals = self.areas_of(self.triangles), self.normals_of(self.triangles)
-        self.mesh = wp.Mesh(
+
+    @cached_property
+    def mesh(self) -> wp.Mesh:
+        """The copy that queries run on."""
+        return wp.Mesh(
             points=self.shift(self.triangles.reshape(-1, 3)),
-            indices=wp.array(np.arange(3 * len(self.triangles), dtype=np.int32), dtype=int, device=device),
+            indices=wp.array(np.arange(3 * len(self.triangles), dtype=np.int32), dtype=int, device=self.device),
             support_winding_number=True,
         )
 
