@@ -84,7 +84,7 @@ class Gaps:
 
     def __init__(self, skin: Skin, spacing: float):
         self.skin, self.spacing, self.device = skin, spacing, skin.device
-        self.grid = wp.HashGrid(128, 128, 128, device=self.device)
+        self.grid = wp.HashGrid(64, 64, 64, device=self.device)
         self.points = self.normals = np.empty((0, 3))
         self.places = Places(self.points, self.normals, *np.empty((2, 0), Nearest.numpy_dtype()), np.empty(0, bool))
 

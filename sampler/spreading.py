@@ -13,7 +13,7 @@ from sampler.spreading_kernels import BEYOND, FREE, HELD, push_apart, throw_dart
 
 _SCATTERED = 12  # random places per wanted particle
 _HALVINGS = 7  # of the range in which the distance of the first placing is sought
-_TURNS, _REFILL_TURNS = 120, 12
+_TURNS, _REFILL_TURNS = 120, 10
 _REFILLS = 16
 _SAMPLED = 40  # places per particle at which gaps are looked for, over the area; and as many over the edges
 _CONFIRMED, _LOOKS = 80, 3  # and at fresh ones where hardly any is left, until none is found there, so often at most
@@ -92,7 +92,7 @@ class _State:
         self.skin, self.device, self.observe, self.beyond = skin, skin.device, observe, beyond
         self.spacing = lattice_spacing(float(skin.areas.sum()), number)
         self.unit_spacing = self.spacing / skin.unit
-        self.grid = wp.HashGrid(128, 128, 128, device=self.device)
+        self.grid = wp.HashGrid(64, 64, 64, device=self.device)
         self.corners = skin.shift(skin.triangles.reshape(-1, 3))
         self.face_normals = self.vectors(skin.normals)
         self.most = number + int(_MORE * number)

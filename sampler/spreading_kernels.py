@@ -8,11 +8,10 @@ from sampler.surface import ASIDE, nearest_face
 _OTHER = wp.constant(-0.7)  # between normals below which two places lie on different skins
 _THROWN = wp.constant(0.85)  # how near to each other particles of different skins may be thrown, of those on one skin
 _CORE, _HARD = wp.constant(8.0), wp.constant(1.25)  # what holds particles apart: strength, and range, of how far they were thrown
+_SIDE = wp.constant(0.6)  # by how much weaker particles push on the other skin of a wall, so that neighbours change sides
 FREE, HELD, BEYOND = wp.constant(0), wp.constant(1), wp.constant(2)
-_BACK, _LEVEL = (
-    wp.constant(0.33),
-    wp.constant(0.3),
-)  # strength of points beyond a rim; how far out of plane, in spacings
+_BACK = wp.constant(0.33)  # strength of points beyond a rim
+_LEVEL = wp.constant(0.3)  # how far out of the plane of another they may lie to push it, in spacings
 _FARTHEST = wp.constant(0.3)  # of a step, in spacings
 
 
@@ -64,7 +63,7 @@ def push_apart(
             distance = wp.length(away)
             beyond = held[j] == BEYOND
             if distance < 2.0 * spacing and not (beyond and wp.abs(wp.dot(away, up)) > _LEVEL * spacing):
-                weight = repulsion(distance, spacing)
+                weight = repulsion(distance, spacing) * (1.0 + _SIDE * (same_skin(up, normals[j]) - 1.0))
                 if beyond:
                     weight *= _BACK
                 else:
