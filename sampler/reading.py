@@ -1,5 +1,6 @@
 """Reading a mesh file and refusing what cannot become a body."""
 
+import io
 import re
 from pathlib import Path
 
@@ -63,10 +64,15 @@ def _load(path: Path) -> trimesh.Trimesh:
     """Everything that trimesh finds in a file, in one mesh, in metres where the file says what its unit is."""
     if path.suffix.lower() == ".stl" and not is_text_stl(data := path.read_bytes()):
         return _read_stl(data)
-    scene = trimesh.load_scene(path, process=False)
+    scene = trimesh.load_scene(
+        _plain_dae(path) if path.suffix.lower() == ".dae" else path, file_type=path.suffix[1:], process=False
+    )
     shapes = list(scene.geometry.values())
     if shapes and not any(isinstance(shape, trimesh.Trimesh) for shape in shapes):
         raise MeshError(f"mesh {path.name}: holds points or lines only, no triangles")
+    for shape in shapes:
+        if isinstance(shape, trimesh.Trimesh):
+            shape.visual = trimesh.visual.ColorVisuals()  # materials cannot be joined where Pillow is not installed
     mesh = scene.to_mesh() if shapes else None
     if mesh is None or not len(mesh.faces):
         raise MeshError(f"mesh {path.name}: has no triangles")
@@ -74,6 +80,12 @@ def _load(path: Path) -> trimesh.Trimesh:
     if path.suffix.lower() in (".dae", ".zae") and unit:
         mesh.apply_scale(float(unit.group(1)))
     return mesh
+
+
+def _plain_dae(path: Path) -> io.BytesIO:
+    """A DAE file without its materials: where one is missing, readers leave out the triangles that wear it."""
+    materials = rb"<(bind_material|library_(?:effects|materials|images))\b[^>]*?(?:/>|>.*?</\1>)"
+    return io.BytesIO(re.sub(materials, b"", path.read_bytes(), flags=re.DOTALL))
 
 
 def _read_stl(data: bytes) -> trimesh.Trimesh:

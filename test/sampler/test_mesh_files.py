@@ -1,6 +1,9 @@
 """Files: units, strips, and every kind of damage that readers pass over."""
 
+import re
 import struct
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -28,6 +31,24 @@ def test_unit_and_node_transforms_of_dae_are_applied(tmp_path, box):
     mesh = read_mesh(path)
     assert mesh.extents == pytest.approx(np.array([0.12, 0.2, 0.04]) * 0.0254, rel=1e-6)
     assert mesh.bounds.mean(axis=0) == pytest.approx([3 * 0.0254, 0, 0], abs=1e-7)
+
+
+def test_materials_of_obj_need_no_pillow(tmp_path, box):
+    path = tmp_path / "painted.obj"
+    lines = [f"v {x} {y} {z}" for x, y, z in box.vertices] + ["vt 0 0", "vt 1 0", "vt 0 1"]
+    lines += ["usemtl red", *(f"f {a + 1}/1 {b + 1}/2 {c + 1}/3" for a, b, c in box.faces)]
+    path.write_text("\n".join(["mtllib missing.mtl", *lines, ""]))
+    code = "import sys; sys.modules['PIL'] = None; from sampler import read_mesh; print(len(read_mesh(sys.argv[1]).faces))"
+    result = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, timeout=60, check=False)
+    assert result.stdout.strip() == "12", result.stderr
+
+
+def test_triangles_of_dae_whose_material_is_missing_are_kept(tmp_path, box):
+    path = tmp_path / "painted.dae"
+    text = box.export(file_type="dae").decode()
+    assert "<instance_effect" in text
+    path.write_text(re.sub(r"<library_effects>.*?</library_effects>", "", text, flags=re.DOTALL))
+    assert len(read_mesh(path).faces) == 12
 
 
 @pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
