@@ -101,7 +101,7 @@ def turn_pieces(triangles: np.ndarray, piece: np.ndarray, around: Surface) -> tu
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     centre, step = triangles.mean(axis=1), 2e-5 * around.unit * normal
-    before, behind = around.winding(centre + step), around.winding(centre - step)
+    before, behind = around.winding(centre + step, rough=True), around.winding(centre - step, rough=True)
     inward = (before < -0.5) & (np.abs(behind) < 0.5)
     outward = (behind > 0.5) & (np.abs(before) < 0.5)
     votes = np.bincount(piece, area * inward) > np.bincount(piece, area * outward)

@@ -13,7 +13,7 @@ from sampler.inset import inset_particles
 from sampler.lattice import lattice_spacing, particle_count
 from sampler.mass import integrate, is_physical
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
-from sampler.sheets import beyond_rims, closed_triangles
+from sampler.sheets import beyond_rims, closed_triangles, thick_plates
 from sampler.skin import Skin, free_triangles, touchable_parts, winding_before
 from sampler.spreading import Observer, spread_particles
 from sampler.surface import Surface
@@ -74,20 +74,19 @@ def sample_body(
     thickness = 2.0 * radius if thickness is None else thickness
     closed, owner = closed_triangles(repaired, thickness)
     fine = _spacing(radius, spacing, count, grain, closed)
-    around = Surface(closed, device)
-    free, parent, layers = free_triangles(closed, around, fine)
-    solid, rimmed = around, np.zeros((0, 3), int)
-    warnings = list(repaired.report.warnings)
-    volume, centre, inertia = _mass(closed, free, parent, layers, around, warnings)
-    if thickness <= 2.0 * radius and np.any(owner == SHEET):
-        # One layer in the sheets; the skin of the solids ends only where it is buried in other solids.
-        rimmed = repaired.faces[repaired.kind == SHEET]
-        free = repaired.vertices[rimmed]
-        solid = None
-        if np.any(owner != SHEET):
-            solid = Surface(closed[owner != SHEET], device)
-            sheet = free_triangles(free, solid, fine)[0]
-            free = np.concatenate([free_triangles(solid.triangles, solid, fine)[0], sheet])
+    around = solid = Surface(closed, device)
+    warnings, plates = list(repaired.report.warnings), np.zeros((0, 3, 3))
+    # Sheets get one layer of particles where they are thin; the skin of the solids ends only where it is buried in other solids.
+    sheet = repaired.faces[repaired.kind == SHEET] if thickness <= 2.0 * radius else np.zeros((0, 3), int)
+    if len(sheet) and np.any(owner != SHEET):
+        solid = Surface(closed[owner != SHEET], device)
+        plates = free_triangles(repaired.vertices[sheet], solid, fine)[0]
+    free, parent, layers = free_triangles(solid.triangles, solid, fine)
+    volume, centre, inertia = _mass(solid, free, parent, layers, thick_plates(plates, thickness), warnings)
+    if solid is not around:
+        free = np.concatenate([free, plates])
+    elif len(sheet):
+        free, solid = repaired.vertices[sheet], None
     if not len(free):
         raise MeshError("mesh: no part of its surface has an outside; check its orientation")
     fine = _spacing(radius, spacing, count, grain, free)
@@ -102,7 +101,7 @@ def sample_body(
             )
         h = lattice_spacing(area, number)
         settle = partial(_clear_creases, skin=skin, solid=solid, spacing=h) if solid else lambda *placed: placed
-        beyond = beyond_rims(repaired.vertices, rimmed, skin, h)
+        beyond = beyond_rims(repaired.vertices, sheet, skin, h)
         points, normals = spread_particles(skin, number, seed, progress, observe, settle, beyond)
         evenness = measure_evenness(skin, points, normals)
         h = lattice_spacing(area, len(points))
@@ -177,16 +176,19 @@ def _spacing(radius, spacing, count, grain, triangles) -> float:
     return fine if grain is None else min(fine, _CLOSED * (radius + grain) / _COVERED)
 
 
-def _mass(closed, free, parent, layers, around, warnings) -> tuple[float, np.ndarray, np.ndarray]:
-    """From all triangles where none is buried, else from the free parts."""
-    whole = np.bincount(parent, minlength=len(closed)) == (Surface.areas_of(closed) > 0.0)
+def _mass(solid, free, parent, layers, plates, warnings) -> tuple[float, np.ndarray, np.ndarray]:
+    """From all triangles of the solid where none is buried, else from its free parts; and from plates beside it."""
+    whole = np.bincount(parent, minlength=len(solid.triangles)) == (solid.areas > 0.0)
+    share = np.ones(len(plates))
     if np.all(whole):
-        volume, centre, inertia = integrate(closed)
+        free, share = solid.triangles, np.ones(len(plates) + len(solid.triangles))
     else:
-        volume, centre, inertia = integrate(free, 1.0 / layers)
+        share = np.concatenate([1.0 / layers, share])
         warnings.append("parts of the surface are buried in others; volume and inertia are those of the union")
-    low, high = closed.min(axis=(0, 1)), closed.max(axis=(0, 1))
+    every = np.concatenate([free, plates])
+    volume, centre, inertia = integrate(every, share) if len(every) else (0.0, every, every)
+    low, high = (limit(np.concatenate([solid.triangles, plates]), axis=(0, 1)) for limit in (np.min, np.max))
     if is_physical(volume, centre, inertia, low, high):
         return volume, centre, inertia
     warnings.append("the surface encloses no sound volume; mass and inertia must be given by hand")
-    return float("nan"), around.triangles.mean(axis=(0, 1)), np.full((3, 3), np.nan)
+    return float("nan"), solid.triangles.mean(axis=(0, 1)), np.full((3, 3), np.nan)

@@ -29,6 +29,17 @@ def closed_triangles(repaired: RepairedMesh, thickness: float) -> tuple[np.ndarr
     return np.concatenate([triangles[~sheet], skins]), kind
 
 
+def thick_plates(triangles: np.ndarray, thickness: float) -> np.ndarray:
+    """Closed prisms, so thick [m], around triangles, shape (n, 3, 3) [m]; shape (8 n, 3, 3)."""
+    aside = 0.5 * thickness * Surface.normals_of(triangles)[:, None]
+    front, back = triangles + aside, triangles - aside
+    parts = [front, back[:, ::-1]]
+    for k in range(3):
+        a, b, c, d = front[:, k], front[:, (k + 1) % 3], back[:, (k + 1) % 3], back[:, k]
+        parts += [np.stack([b, a, d], axis=1), np.stack([b, d, c], axis=1)]
+    return np.concatenate(parts)
+
+
 def thicken(vertices: np.ndarray, faces: np.ndarray, thickness: float) -> tuple[np.ndarray, np.ndarray]:
     """Closed surface at half a thickness from both sides of a sheet, with flat rims.
 

@@ -357,3 +357,13 @@ def test_no_particle_looks_into_the_wall_beside_it():
     body = sample_body(mesh, radius=0.002, count=1500)
     before = body.points + 2e-5 * np.linalg.norm(mesh.extents) * body.normals
     assert not solid_angle_inside(body.triangles, before).any()
+
+
+def test_a_sheet_beside_a_solid_weighs_what_its_thickness_says():
+    block = trimesh.creation.box((0.1, 0.1, 0.1))
+    corners = [[0.05, -0.05, 0], [0.25, -0.05, 0], [0.25, 0.05, 0], [0.05, 0.05, 0]]
+    plate = trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
+    body = sample_body(trimesh.util.concatenate([block, plate]), radius=0.004, thickness=0.002, count=1000)
+    assert body.volume == pytest.approx(1e-3 + 0.02 * 0.002, rel=1e-12)
+    assert body.centre == pytest.approx([0.15 * 0.02 * 0.002 / body.volume, 0.0, 0.0], abs=1e-12)
+    assert body.steps["sheets"] == 1
