@@ -96,8 +96,8 @@ class Gaps:
         moved[before] |= np.einsum("ij,ij->i", normals[before], self.normals) < _TURNED
         changed = np.concatenate([points[moved], self.points[moved[before]]])
         self.points, self.normals = (
-            np.where(moved[:, None], now, np.concatenate([then, now[len(then) :]]))
-            for now, then in ((points, self.points), (normals, self.normals))
+            np.where(moved[:, None], new, np.concatenate([old, new[len(old) :]]))
+            for new, old in ((points, self.points), (normals, self.normals))
         )
         self._where, self._up = self.skin.shift(self.points), self._vectors(self.normals)
         self.grid.build(self._where, self.spacing / self.skin.unit)

@@ -64,8 +64,9 @@ def _load(path: Path) -> trimesh.Trimesh:
     """Everything that trimesh finds in a file, in one mesh, in metres where the file says what its unit is."""
     if path.suffix.lower() == ".stl" and not is_text_stl(data := path.read_bytes()):
         return _read_stl(data)
-    scene = trimesh.load_scene(
-        _plain_dae(path) if path.suffix.lower() == ".dae" else path, file_type=path.suffix[1:], process=False
+    dae = path.suffix.lower() == ".dae"
+    scene = (
+        trimesh.load_scene(_plain_dae(path), file_type="dae", process=False) if dae else trimesh.load_scene(path, process=False)
     )
     shapes = list(scene.geometry.values())
     if shapes and not any(isinstance(shape, trimesh.Trimesh) for shape in shapes):

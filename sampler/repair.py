@@ -125,9 +125,9 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
 
 
 def _meet(vertices: np.ndarray, joined: np.ndarray) -> np.ndarray:
-    """Vertices, moved half-way to those they are joined with."""
-    number = np.maximum(np.bincount(joined, minlength=len(vertices)), 1)[:, None]
-    return np.stack([np.bincount(joined, x, len(vertices)) for x in vertices.T], axis=1) / number
+    """Vertices, moved to the middle of those they are joined with."""
+    middle = np.stack([np.bincount(joined, x, len(vertices)) for x in vertices.T], axis=1)
+    return middle[joined] / np.bincount(joined)[joined, None]
 
 
 def _drop(faces: np.ndarray, report: RepairReport) -> np.ndarray:

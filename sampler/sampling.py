@@ -179,15 +179,14 @@ def _spacing(radius, spacing, count, grain, triangles) -> float:
 def _mass(solid, free, parent, layers, plates, warnings) -> tuple[float, np.ndarray, np.ndarray]:
     """From all triangles of the solid where none is buried, else from its free parts; and from plates beside it."""
     whole = np.bincount(parent, minlength=len(solid.triangles)) == (solid.areas > 0.0)
-    share = np.ones(len(plates))
-    if np.all(whole):
-        free, share = solid.triangles, np.ones(len(plates) + len(solid.triangles))
-    else:
-        share = np.concatenate([1.0 / layers, share])
+    pieces, share = solid.triangles, np.ones(len(solid.triangles))
+    if not np.all(whole):
+        pieces, share = free, 1.0 / layers
         warnings.append("parts of the surface are buried in others; volume and inertia are those of the union")
-    every = np.concatenate([free, plates])
-    volume, centre, inertia = integrate(every, share) if len(every) else (0.0, every, every)
-    low, high = (limit(np.concatenate([solid.triangles, plates]), axis=(0, 1)) for limit in (np.min, np.max))
+    every = np.concatenate([pieces, plates])
+    volume, centre, inertia = integrate(every, np.append(share, np.ones(len(plates)))) if len(every) else (0.0, every, every)
+    corners = np.concatenate([solid.triangles, plates]).reshape(-1, 3)
+    low, high = corners.min(axis=0), corners.max(axis=0)
     if is_physical(volume, centre, inertia, low, high):
         return volume, centre, inertia
     warnings.append("the surface encloses no sound volume; mass and inertia must be given by hand")
