@@ -3,6 +3,7 @@
 import time
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from itertools import chain, count
 from pathlib import Path
 
@@ -185,7 +186,7 @@ class SandSimNode(LifecycleNode):
             pack_history=lambda: self.recorder.log.pack(),  # noqa: PLW0108 - the log is another one after a reset
             unpack_history=lambda packed: self.recorder.log.unpack(packed),  # noqa: PLW0108
         )
-        self._last: Observation | None = None
+        self._last = self._diagnosed = None
         self._told = time.monotonic()
         self._connect(world, robot.fixed_frames() if robot else [])
         self._endings.callback(self.simulation.stop)  # before what it publishes to goes
@@ -250,9 +251,12 @@ class SandSimNode(LifecycleNode):
         duration = self.parameters["duration"]
         self.done = self.done or bool(duration and observation.time > duration - 0.5 * self.simulation.frame)
 
-    def _publish_state(self, observation: Observation) -> None:
+    def _publish_clock(self, observation: Observation) -> None:
         if self._clock_publisher:
             self._clock_publisher.publish(Clock(clock=time_to_stamp(observation.time)))
+
+    def _publish_state(self, observation: Observation) -> None:
+        self._publish_clock(observation)
         for tool in self._tools:
             tool.publish(observation)
         if self._frames:
@@ -285,10 +289,19 @@ class SandSimNode(LifecycleNode):
             return
         self._diagnostics.publish(self._diagnosis.tell(self._last, self._bed.dropped))
         self._watch.look()
+        # Whoever comes while nothing moves still sees where it stands.
         if self.simulation.fault is not None:
-            # Whoever comes now still sees the last good state.
             self._publish_state(self._last)
             self._bed.tell(self._last)
+        elif self._last is self._diagnosed:
+            self.simulation.request(partial(self._repeat, self._last))  # where what follows is told: time never runs back
+        self._diagnosed = self._last
+
+    def _repeat(self, observation: Observation) -> None:
+        """Tell the time and the bed again, but no frames or wrenches, of which each stamp is told once."""
+        if observation is self._last:
+            self._publish_clock(observation)
+            self._bed.tell(observation)
 
 
 def _unused(path: Path) -> Path:

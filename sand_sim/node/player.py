@@ -42,7 +42,8 @@ def play(scene: Scene, target: str, interruption: Interruption) -> int:
         due, heard = next(times, None), False
         while not interruption.asked:
             rclpy.spin_once(node, timeout_sec=0.05)
-            present = all(node.count_subscribers(topic) for topic in topics.values())
+            # Matched, not only known: what is sent before that is lost, and the node would wait for it.
+            present = all(publisher.get_subscription_count() for publisher in publishers.values())
             heard = heard or (present and clock[0] is not None)
             if heard and (not present or clock[0] > scene.duration - 0.5 / scene.frame_rate):
                 return 0

@@ -20,7 +20,11 @@ def sand_sim(folder, *words, **further):
 
 
 def finish(process):
-    output, errors = process.communicate(timeout=PATIENCE)
+    try:
+        output, errors = process.communicate(timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGINT)  # or the processes it has started would talk into the tests that follow
+        pytest.fail(f"still running: {process.communicate(timeout=PATIENCE)}")
     return process.returncode, output, errors
 
 

@@ -10,6 +10,8 @@ from std_msgs.msg import String
 from sand_sim.node import connections
 from sand_sim.node.connections import COMMANDS_DEPTH, Connections
 
+pytestmark = pytest.mark.xdist_group("processes")  # others count the files that the middleware shares
+
 
 class Chatter:
     """A node that hears itself."""

@@ -13,6 +13,7 @@ from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from nav_msgs.msg import MapMetaData
 from node_client import NO_TURN, START
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Float64
 from visualization_msgs.msg import MarkerArray
@@ -34,6 +35,17 @@ def hear(client, kind, topic, depth=100):
     heard = []
     client.node.create_subscription(kind, topic, heard.append, depth)
     return heard
+
+
+def test_whoever_comes_late_hears_the_time_and_the_bed_though_nothing_moves(client, start_node):
+    start_node(pacing="lockstep")
+    client.wait_for(lambda: client.clocks)
+    clocks, clouds = hear(client, Clock, "/clock"), hear(client, PointCloud2, "/sand_sim/points")
+    frames = hear(client, WrenchStamped, f"{TOOL}/wrench")
+    client.wait_for(lambda: clocks and clouds)
+    assert stamp_to_time(clocks[-1].clock) == 0.0
+    assert len(cloud_to_points(clouds[-1])) == 32
+    assert not frames
 
 
 def press(client, orientation=NO_TURN):
