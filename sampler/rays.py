@@ -45,8 +45,8 @@ _LEAVINGS = """
         const float above[2] = {most[right] - start[0], most[ahead] - start[1]};
         for (int k = 0; k < 2; ++k) {
             const float a = (below[k] - 1e-6f) * slower[k], b = (above[k] + 1e-6f) * slower[k];
-            enter = max(enter, min(a, b));
-            leave = min(leave, max(a, b));
+            enter = wp::max(enter, wp::min(a, b));  // CUDA has its own, which would be as good a match
+            leave = wp::min(leave, wp::max(a, b));
         }
         if (enter > leave + 1e-5f) continue;
         if (!low.b) {

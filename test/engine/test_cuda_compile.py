@@ -5,7 +5,7 @@ from functools import cache, partial
 from pathlib import Path
 
 import pytest
-import warp as wp
+from cuda_compiling import ARCHITECTURES, compile_all
 from many_threads import ManyThreads
 
 from sand_sim import load_scene
@@ -19,16 +19,7 @@ from sand_sim.precision import PRECISIONS
 
 CONFIG = Path(__file__).parents[2] / "config"
 SCENES = [path.stem for path in sorted(CONFIG.glob("*.yaml"))]
-ARCHITECTURES = (80, 90)
 ALL = (recipe.PLANE, recipe.CYLINDER, recipe.SHELL, recipe.ROUGH, recipe.PLUNGER)
-
-
-def compile_all(kernels, architectures, folder):
-    assert kernels
-    for kernel in kernels:
-        paths = wp.compile_aot_module(kernel.module, arch=architectures, module_dir=folder)
-        assert len(paths) == len(architectures)
-        assert all(path.stat().st_size > 1000 for path in paths), kernel.key
 
 
 @cache
