@@ -5,6 +5,9 @@ import numpy as np
 from sampler.surface import Surface
 from sampler.topology import Edges, edges_of, link_items
 
+_STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what is there
+_VOTERS = 100  # largest faces of a piece, which tell what side of it is the inside
+
 
 def agree_faces(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, int]:
     """Turn faces so that neighbours run along their common edges in opposite directions.
@@ -86,8 +89,8 @@ def face_outward(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray,
     return np.where(turned[component][:, None], faces[:, ::-1], faces), int(turned.sum())
 
 
-def turn_pieces(triangles: np.ndarray, piece: np.ndarray, around: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Find pieces that face inward in spite of their neighbours, and faces that have the outside on both sides.
+def inward_pieces(triangles: np.ndarray, piece: np.ndarray, around: Surface) -> np.ndarray:
+    """Find pieces that face inward in spite of their neighbours.
 
     Args:
         triangles: shape (n, 3, 3) [m].
@@ -95,14 +98,27 @@ def turn_pieces(triangles: np.ndarray, piece: np.ndarray, around: Surface) -> tu
         around: all surfaces.
 
     Returns:
-        Faces to turn, shape (n,), and faces without an inside, shape (n,).
+        Faces of such pieces, shape (n,) bool; the largest faces of a piece decide.
     """
     area = Surface.areas_of(triangles)
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    centre, step = triangles.mean(axis=1), 2e-5 * around.unit * normal
-    before, behind = around.winding(centre + step, rough=True), around.winding(centre - step, rough=True)
+    order = np.lexsort([-area, piece])
+    begin = np.searchsorted(piece[order], piece[order])
+    asked = order[np.arange(len(order)) - begin < _VOTERS]
+    before, behind = _sides(triangles[asked], around)
     inward = (before < -0.5) & (np.abs(behind) < 0.5)
     outward = (behind > 0.5) & (np.abs(before) < 0.5)
-    votes = np.bincount(piece, area * inward) > np.bincount(piece, area * outward)
-    return votes[piece], (np.abs(before) < 0.5) & (np.abs(behind) < 0.5)
+    vote = np.bincount(piece[asked], area[asked] * (1.0 * inward - outward))
+    return vote[piece] > 0.0
+
+
+def outside_on_both_sides(triangles: np.ndarray, around: Surface) -> np.ndarray:
+    """Triangles, shape (n, 3, 3) [m], without an inside on any side, shape (n,) bool."""
+    before, behind = _sides(triangles, around)
+    return (np.abs(before) < 0.5) & (np.abs(behind) < 0.5)
+
+
+def _sides(triangles: np.ndarray, around: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Rough winding numbers closely before and behind the middles of triangles."""
+    centre, step = triangles.mean(axis=1), _STEP * around.unit * Surface.normals_of(triangles)
+    before = around.winding(centre + step, rough=True)
+    return before, before + around.leavings(centre - step, centre + step)

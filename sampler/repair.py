@@ -10,7 +10,7 @@ import trimesh
 
 from sampler.caps import close_holes
 from sampler.errors import MeshError
-from sampler.orientation import agree_faces, face_outward, turn_pieces
+from sampler.orientation import agree_faces, face_outward, inward_pieces, outside_on_both_sides
 from sampler.reading import check_mesh
 from sampler.surface import Surface
 from sampler.topology import edges_of, link_items, merge_points
@@ -180,12 +180,13 @@ def _interfaces(faces: np.ndarray, opposed: np.ndarray) -> np.ndarray:
 
 def _mend_pieces(vertices, faces, kind, piece, asked, report) -> tuple[np.ndarray, np.ndarray]:
     """Turn pieces between many-sided edges that still face inward; what then has the outside on both sides is a sheet."""
-    for last in (False, True):
-        turn, free = turn_pieces(vertices[faces[asked]], piece[asked], Surface(vertices[faces[kind != SHEET]]))
-        if last or not turn.any():
-            break
-        faces[asked[turn]] = faces[asked[turn]][:, ::-1]
-        report.steps["faces turned"] += int(turn.sum())
+    around = Surface(vertices[faces[kind != SHEET]])
+    turn = asked[inward_pieces(vertices[faces[asked]], piece[asked], around)]
+    if len(turn):
+        faces[turn] = faces[turn, ::-1]
+        report.steps["faces turned"] += len(turn)
+        around = Surface(vertices[faces[kind != SHEET]])
+    free = outside_on_both_sides(vertices[faces[asked]], around)
     kind[asked[free]] = SHEET
     report.steps["faces of double walls"] = int(free.sum())
     return faces, kind

@@ -12,6 +12,7 @@ _DEEPEST = 400  # cuts through one triangle
 _ISLAND = 1.5  # triangles longer than this are halved, others cut along the planes that cross them; in spacings
 _NARROW = 1e-7  # of the diagonal: narrower triangles have no normal in single precision
 _THIRDS = (np.ones((3, 3)) + 3.0 * np.eye(3)) / 6.0  # places of a triangle, the middles of parts of it
+_CENTRE = np.ones((1, 3)) / 3.0
 _MIDDLE = np.array([[0.36, 0.34, 0.3], [0.31, 0.36, 0.33]])  # near its middle, but hardly on edges of others
 _SLIT, _LARGE = 0.1, 0.5  # longest edge of the pieces at the ends of slits, and of those inside or beside them, in spacings
 _WIDE = 4.0  # triangles with longer edges, in roots of their area, are needles
@@ -132,16 +133,16 @@ def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
     if np.all(np.abs(winding_before(places, normals, solid, step)) < 0.5):
         return triangles
-    before = triangles.mean(axis=1) + _STEP * solid.unit * Surface.normals_of(triangles)
-    judged = np.abs(solid.winding(before, rough=True)) < 0.5  # the others were judged free all the same
-    pieces, parent, outside = triangles[judged], np.flatnonzero(judged), before[judged]
+    outside = triangles.mean(axis=1) + _STEP * solid.unit * Surface.normals_of(triangles)  # they were judged free there
+    pieces, parent = triangles, np.arange(len(triangles))
     whole, parts = np.ones(len(triangles), bool), [(triangles[:0], parent[:0])]
     while len(pieces):
         size = np.minimum(_longest_edges(pieces), _WIDE * np.sqrt(Surface.areas_of(pieces)))  # needles would become very many
-        small, room = size <= _LARGE * spacing, np.ones(len(pieces), int)
-        room[small] = _room(pieces[small], outside[small], solid, step).sum(axis=1)
-        done = small & ((room % 3 == 0) | (size <= _SLIT * spacing))
-        stays = done & (room >= 2)
+        small, tiny, room = size <= _LARGE * spacing, size <= _SLIT * spacing, np.full(len(pieces), np.nan)
+        for asked, weights in ((tiny, _CENTRE), (small & ~tiny, _THIRDS)):
+            room[asked] = _room(pieces[asked], weights, outside[asked], solid, step)
+        done = tiny | (room == 0.0) | (room == 1.0)
+        stays = done & (room > 0.5)
         whole[parent[done & ~stays]] = False
         parts.append((pieces[stays], parent[stays]))
         pieces, parent, outside = _halve(pieces[~done]), np.tile(parent[~done], 2), np.tile(outside[~done], (2, 1))
@@ -149,10 +150,11 @@ def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.
     return np.concatenate([triangles[whole], pieces[~whole[parent]]])
 
 
-def _room(triangles: np.ndarray, outside: np.ndarray, solid: Surface, step: float) -> np.ndarray:
-    """Whether there is room before the middles of three parts of triangles, as there is at points near them; shape (n, 3)."""
-    places = np.einsum("nij,ki->nkj", triangles, _THIRDS) + step * solid.unit * Surface.normals_of(triangles)[:, None]
-    return (solid.leavings(np.repeat(outside, 3, axis=0), places.reshape(-1, 3)) == 0).reshape(-1, 3)
+def _room(triangles: np.ndarray, weights: np.ndarray, outside: np.ndarray, solid: Surface, step: float) -> np.ndarray:
+    """Share of places of triangles before which there is room, as there is at points near them; shape (n,)."""
+    places = np.einsum("nij,ki->nkj", triangles, weights) + step * solid.unit * Surface.normals_of(triangles)[:, None]
+    ways = np.repeat(outside, len(weights), axis=0), places.reshape(-1, 3)
+    return (solid.leavings(*ways) == 0).reshape(-1, len(weights)).mean(axis=1)
 
 
 def _islands(triangles: np.ndarray, cell: float) -> np.ndarray:
