@@ -103,12 +103,13 @@ class Gaps:
         self.grid.build(self._where, self.spacing / self.skin.unit)
         places = self.places
         stale = _near_cells(places.points, changed, self.spacing) | (places.own["way"] > 1.0)  # farther ones may be anywhere
-        places.closest[stale], places.own[stale] = self._measure(places.points[stale], places.normals[stale])
+        places.closest[stale], places.own[stale] = self.measure(places.points[stale], places.normals[stale])
 
     def add(self, points: np.ndarray, normals: np.ndarray, fixed: bool = False) -> None:
-        """Look at more places, shape (n, 3) [m], with the normals there; for good where they are fixed, else while in doubt."""
-        fixed = np.full(len(points), fixed)
-        self.places = self.places.joined(Places(points, normals, *self._measure(points, normals), fixed))
+        """Look at more places, shape (n, 3) [m], with the normals there; for good if they are fixed, else those in doubt."""
+        found = self.measure(points, normals, 1.0 if fixed else _GAP - _WATCHED)
+        new = Places(points, normals, *found, np.full(len(points), fixed))
+        self.places = self.places.joined(new if fixed else new.at(new.excess > -_WATCHED))
 
     def judge(self, pinned: np.ndarray, random: np.random.Generator) -> Verdict:
         """Say what is wrong; of particles too near to others those that are not pinned, shape (n,), are to blame."""
@@ -140,11 +141,11 @@ class Gaps:
         launch_shares(find_nearest, len(self.points), [self.grid.id, self._where, 2.0 * unit], [nearest], self.device)
         return nearest.numpy() / unit
 
-    def _measure(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Particles nearest to places, and along the surface."""
+    def measure(self, points: np.ndarray, normals: np.ndarray, enough: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+        """Particles nearest to places, and along the surface, as ``find_gaps``."""
         found = tuple(wp.empty(len(points), dtype=Nearest, device=self.device) for _ in range(2))
         inputs = [self.grid.id, self._where, self._up, self.skin.shift(points), self._vectors(normals)]
-        launch_shares(find_gaps, len(points), [*inputs, self.spacing / self.skin.unit], list(found), self.device)
+        launch_shares(find_gaps, len(points), [*inputs, self.spacing / self.skin.unit, enough], list(found), self.device)
         return tuple(values.numpy() for values in found)
 
     def _missed(self) -> np.ndarray:
@@ -185,7 +186,8 @@ class Gaps:
         """Places a little aside of doubtful ones."""
         points, normals = (np.tile(x[doubtful], (len(_CLOSER), 1)) for x in (self.places.points, self.places.normals))
         aside = np.repeat(_CLOSER, len(doubtful))[:, None] * self.spacing * random.standard_normal(points.shape)
-        points, face = self.skin.closest(points + aside, up=normals)
+        reach = 1.01 * np.linalg.norm(aside, axis=1) + 1e-4 * self.skin.unit  # the way back, if none is shorter
+        points, face = self.skin.closest(points + aside, reach, up=normals)
         return points, self.skin.normals[face]
 
     def _vectors(self, values: np.ndarray) -> wp.array:
@@ -196,8 +198,8 @@ def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Eve
     """Measure particles, shape (n, 3) [m], with their normals, on the surface they lie on."""
     gaps = Gaps(skin, lattice_spacing(float(skin.areas.sum()), len(points)))
     gaps.look(points, normals)
-    gaps.add(*skin.places(_MEASURED * len(points), np.random.default_rng(1)))
-    nearest, free, own = gaps.neighbour_distances(), gaps.places.closest["way"], gaps.places.own["way"]
+    closest, own = gaps.measure(*skin.places(_MEASURED * len(points), np.random.default_rng(1)), _GAP - _WATCHED)
+    nearest, free, own = gaps.neighbour_distances(), closest["way"], own["way"]
     variation = nearest.std() / nearest.mean()
     return Evenness(*map(float, (variation, nearest.min(), nearest.max(), free.max(), own.max())))
 

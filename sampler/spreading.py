@@ -13,7 +13,7 @@ from sampler.spreading_kernels import BEYOND, FREE, HELD, push_apart, throw_dart
 
 _SCATTERED = 12  # random places per wanted particle
 _HALVINGS = 7  # of the range in which the distance of the first placing is sought
-_TURNS, _REFILL_TURNS = 120, 10
+_TURNS, _FEW, _REFILL_TURNS = 60, 1000, 10  # few particles turn twice as often: more of them lie on rims and small pieces
 _REFILLS = 16
 _SAMPLED = 40  # places per particle at which gaps are looked for, over the area; and as many over the edges
 _CONFIRMED, _LOOKS = 80, 3  # and at fresh ones where hardly any is left, until none is found there, so often at most
@@ -55,9 +55,10 @@ def spread_particles(
     start = number - int(_SPARE * number)
     points, normals, state.apart = _throw(skin, start, state.spacing, random)
     state.place(points, normals, np.zeros(start, bool))
-    total = _TURNS + _REFILLS * _REFILL_TURNS
-    for turn in range(_TURNS):
-        state.push(_STRENGTH * (1.0 - 0.8 * turn / _TURNS))
+    turns = 2 * _TURNS if number < _FEW else _TURNS
+    total = turns + _REFILLS * _REFILL_TURNS
+    for turn in range(turns):
+        state.push(_STRENGTH * (1.0 - 0.8 * turn / turns))
         progress((turn + 1) / total)
     state.pinned = np.zeros(start, bool)
     gaps = Gaps(skin, state.spacing)
@@ -80,7 +81,7 @@ def spread_particles(
         state.refill(*found, verdict, pin=turn > 0)
         for k in range(_REFILL_TURNS):
             state.push(_STRENGTH * (0.6 - 0.5 * k / _REFILL_TURNS))
-            progress((_TURNS + turn * _REFILL_TURNS + k) / total)
+            progress((turns + turn * _REFILL_TURNS + k) / total)
     progress(1.0)
     return best
 
@@ -123,7 +124,7 @@ class _State:
         return self.points.numpy()[: self.number] * self.skin.unit + self.skin.centre
 
     def result(self) -> tuple[np.ndarray, np.ndarray]:
-        points, face = self.skin.closest(self.positions(), up=self.normals.numpy()[: self.number])
+        points, face = self.skin.closest(self.positions(), 0.1 * self.spacing, up=self.normals.numpy()[: self.number])
         return points, self.skin.normals[face]
 
     def refill(self, points: np.ndarray, normals: np.ndarray, verdict: Verdict, pin: bool) -> None:
