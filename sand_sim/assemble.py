@@ -28,6 +28,7 @@ from sand_sim.tool_model import Progress, ToolModel, model_tool
 _SKIN = 0.25  # of the mean grain radius
 _SPHERES_PER_THREAD = 1000
 _MARGIN = 0.25  # of the scene's largest edge, free around everything in it
+_ROUNDED = 1e-3  # of the acceleration of gravity, that rounding may take off or add, before what it does is carried over
 _FLOOR = 0.05  # a plane whose normal points up by at least this much is a floor
 
 
@@ -133,6 +134,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     time_step, frame_steps = _time_step(light, table, smallest, walls, tools, grounds)
     precision = PRECISIONS[scene.solver.precision]
     lattice = _lattice(scene, table, walls, tools, grounds, precision)
+    _check_inside(table, lattice)
     recipe = Recipe(
         contact=scene.contact,
         precision=precision,
@@ -141,6 +143,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         bodies=len(table.bodies) > 0,
         smooth_tools=any(tool.smooth for tool in tools),
         surfaces=kinds_of(walls),
+        carry=_loses_digits(scene, time_step, precision),
     )
     mean = float(table.radius.mean())
     skin, radius = (scene.solver.skin, 0.0) if scene.solver.skin else (_SKIN * mean, mean)
@@ -254,6 +257,11 @@ def _fall_height(scene: Scene, table: GrainTable, walls: list[Wall], grounds: li
     return max(heights)
 
 
+def _loses_digits(scene: Scene, time_step: TimeStep, precision: Precision) -> bool:
+    """Whether rounding the fastest velocity to expect may change it by a notable share of what gravity does in a step."""
+    return 0.5 * precision.epsilon * time_step.speed > _ROUNDED * float(np.linalg.norm(scene.gravity)) * time_step.value > 0.0
+
+
 def _lattice(
     scene: Scene, table: GrainTable, walls: list[Wall], tools: list[ToolModel], grounds: list[Ground], precision: Precision
 ) -> Lattice:
@@ -284,6 +292,16 @@ def _lattice(
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = _MARGIN * float(np.max(high - low))
     return Lattice(low - margin, high + margin, precision, reserve)
+
+
+def _check_inside(table: GrainTable, lattice: Lattice) -> None:
+    centres = np.concatenate([table.position[table.lone], table.bodies.position])
+    outside = np.any((centres < lattice.low) | (centres > lattice.high), axis=1)
+    if outside.any():
+        raise SceneError(
+            f"domain: {outside.sum()} of {len(centres)} grains start outside of it, the first at "
+            f"{centres[outside][0].round(6).tolist()} m; enlarge 'domain' or move them"
+        )
 
 
 def _pair_table(scene: Scene, order: list[str], precision: Precision) -> list[list]:

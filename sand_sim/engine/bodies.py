@@ -27,6 +27,7 @@ class Bodies:
         remainder: what the position is beyond whole quanta, vec3, shape (n,) [quantum].
         motion: velocity [m/s] and mass [kg], vec4, shape (n,).
         half_motion: velocity half a step ago, vec3, shape (n,) [m/s]; None unless the integrator asks.
+        motion_carry: what rounding took off the velocity, vec3, shape (n,) [m/s]; None unless the recipe asks.
         turn: body frame to world frame, quatd, shape (n,).
         momentum: angular, world frame, half a step ago if the integrator asks, vec3d, shape (n,) [kg m^2/s].
         inertia: principal moments, vec3d, shape (n,) [kg m^2].
@@ -54,6 +55,7 @@ class Bodies:
         self.half_motion = None
         if recipe.integrator == VERLET:
             self.half_motion = wp.array(bodies.velocity.astype(real), dtype=precision.vec3, device=device)
+        self.motion_carry = wp.zeros(number, dtype=precision.vec3, device=device) if recipe.carry else None
         self.turn = wp.array(bodies.orientation, dtype=wp.quatd, device=device)
         self.inertia = wp.array(bodies.inertia, dtype=wp.vec3d, device=device)
         self.momentum = wp.array(_angular_momentum(table), dtype=wp.vec3d, device=device)

@@ -4,6 +4,7 @@ from functools import cache
 
 import warp as wp
 
+from sand_sim.engine.adding import build_add
 from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_TOO_FAST
 from sand_sim.engine.free_rotation import ease_of, rotate_freely, spin_of
 from sand_sim.engine.kernel import kernel, sure
@@ -64,6 +65,7 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
     real, whole, vec3, vec4 = precision.real, precision.whole, precision.vec3, precision.vec4
     whole3, whole4, mat33 = precision.whole3, precision.whole4, precision.mat33
     gather_body, fetch_grain = build_gather_body(precision), build_fetch_grain(recipe)
+    add, carry = build_add(precision), recipe.carry
     fetch_felt, fetch_place = build_prefetch(vec3), build_prefetch(whole4)
 
     @kernel
@@ -78,6 +80,7 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
         remainder: wp.array(dtype=vec3),
         body_motion: wp.array(dtype=vec4),
         half_motion: wp.array(dtype=vec3),
+        motion_carry: wp.array(dtype=vec3),
         turn: wp.array(dtype=wp.quatd),
         momentum: wp.array(dtype=wp.vec3d),
         inertia: wp.array(dtype=wp.vec3d),
@@ -119,17 +122,23 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
             old = body_motion[b]
             gain = (force / old[3] + gravity) * dt
             push = wp.vec3d(wp.float64(torque[0]), wp.float64(torque[1]), wp.float64(torque[2])) * wp.float64(dt)
-            velocity = vec3(old[0], old[1], old[2]) + gain
-            now = velocity
+            half = gain * real(0.5)
+            half_push = push * wp.float64(0.5)
+            velocity = vec3(old[0], old[1], old[2])
             turning = momentum[b] + push
+            if wp.static(verlet):
+                velocity = half_motion[b]
+                if starting[0] != 0:
+                    gain = half
+                    turning -= half_push
+            if wp.static(carry):
+                velocity, kept = add(velocity, gain, motion_carry[b])
+                motion_carry[b] = kept
+            else:
+                velocity += gain
+            now = velocity
             turning_now = turning
             if wp.static(verlet):
-                half = gain * real(0.5)
-                half_push = push * wp.float64(0.5)
-                velocity = half_motion[b] + gain
-                if starting[0] != 0:
-                    velocity -= half
-                    turning -= half_push
                 half_motion[b] = velocity
                 now = velocity + half
                 turning_now = turning + half_push

@@ -20,6 +20,7 @@ class Grains:
         motion: velocity [m/s] and, last, mass [kg], vec4, shape (n,).
         spin: angular velocity [rad/s] and, last, moment of inertia [kg m^2], vec4, shape (n,); None without rotation.
         half_motion, half_spin: velocities half a step ago, vec3, shape (n,) [m/s], [rad/s]; None unless the integrator asks.
+        motion_carry, spin_carry: what rounding took off the velocities, vec3, shape (n,); None unless the recipe asks.
         member: which member of the rigid bodies a sphere is, -1 for none, shape (n,), int; None without bodies.
         material: shape (n,), int; None if all grains are of one material.
         identity: row of the sphere in the scene's table, shape (n,), int.
@@ -38,6 +39,8 @@ class Grains:
         halves, vec3 = recipe.integrator == VERLET, precision.vec3
         self.half_motion = wp.zeros(number, dtype=vec3, device=device) if halves else None
         self.half_spin = wp.zeros(number, dtype=vec3, device=device) if halves and recipe.rotation else None
+        self.motion_carry = wp.zeros(number, dtype=vec3, device=device) if recipe.carry else None
+        self.spin_carry = wp.zeros(number, dtype=vec3, device=device) if recipe.carry and recipe.rotation else None
         self.member = wp.zeros(number, dtype=int, device=device) if recipe.bodies else None
         self.material = wp.zeros(number, dtype=int, device=device) if recipe.materials else None
         self.identity = wp.zeros(number, dtype=int, device=device)
@@ -49,7 +52,7 @@ class Grains:
     def sorted_arrays(self) -> list[wp.array]:
         """All arrays that are renumbered together."""
         arrays = [self.place, self.remainder, self.motion, self.spin, self.half_motion, self.half_spin]
-        arrays += [self.member, self.material, self.identity, self.came_from]
+        arrays += [self.motion_carry, self.spin_carry, self.member, self.material, self.identity, self.came_from]
         return [array for array in arrays if array is not None]
 
     def load(self, table: GrainTable) -> None:

@@ -4,6 +4,7 @@ from functools import cache
 
 import warp as wp
 
+from sand_sim.engine.adding import build_add
 from sand_sim.engine.count import count_of
 from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_TOO_FAST
 from sand_sim.engine.gather import build_gather
@@ -39,7 +40,7 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
         precision.whole3,
         precision.whole4,
     )
-    gather = build_gather(recipe, walls, tools)
+    gather, add, carry = build_gather(recipe, walls, tools), build_add(precision), recipe.carry
 
     @kernel
     def move_grains(
@@ -52,6 +53,8 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
         spin: wp.array(dtype=vec4),
         half_motion: wp.array(dtype=vec3),
         half_spin: wp.array(dtype=vec3),
+        motion_carry: wp.array(dtype=vec3),
+        spin_carry: wp.array(dtype=vec3),
         origin: wp.array(dtype=whole4),
         pair_starts: wp.array(dtype=int),
         pair_force: wp.array(dtype=vec4),
@@ -117,12 +120,18 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
                 continue
             old = motion[i]
             gain = (total / old[3] + gravity) * dt
-            velocity = vec3(old[0], old[1], old[2]) + gain
+            half = gain * real(0.5)
+            velocity = vec3(old[0], old[1], old[2])
             if wp.static(verlet):
-                half = gain * real(0.5)
-                velocity = half_motion[i] + gain
+                velocity = half_motion[i]
                 if starting[0] != 0:
-                    velocity -= half
+                    gain = half
+            if wp.static(carry):
+                velocity, left = add(velocity, gain, motion_carry[i])
+                motion_carry[i] = left
+            else:
+                velocity += gain
+            if wp.static(verlet):
                 half_motion[i] = velocity
                 motion[i] = vec4(velocity[0] + half[0], velocity[1] + half[1], velocity[2] + half[2], old[3])
             else:
@@ -130,12 +139,18 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
             if wp.static(rotation):
                 turning = spin[i]
                 gained = torque * (dt / turning[3])
-                spun = vec3(turning[0], turning[1], turning[2]) + gained
+                half_gained = gained * real(0.5)
+                spun = vec3(turning[0], turning[1], turning[2])
                 if wp.static(verlet):
-                    half_gained = gained * real(0.5)
-                    spun = half_spin[i] + gained
+                    spun = half_spin[i]
                     if starting[0] != 0:
-                        spun -= half_gained
+                        gained = half_gained
+                if wp.static(carry):
+                    spun, spun_left = add(spun, gained, spin_carry[i])
+                    spin_carry[i] = spun_left
+                else:
+                    spun += gained
+                if wp.static(verlet):
                     half_spin[i] = spun
                     spun += half_gained
                 spin[i] = vec4(spun[0], spun[1], spun[2], turning[3])

@@ -21,6 +21,7 @@ class Recipe:
         integrator: one of ``integrator.INTEGRATORS``.
         smooth_tools: grains touch the true surfaces of some tools, not their particles.
         surfaces: what walls there are: ``plane``, ``cylinder``, ``shell``; and whether some are ``rough`` or a ``plunger``.
+        carry: steps are so short that what rounding takes off velocities must be carried over to the next step.
     """
 
     contact: ContactModel = field(default_factory=ContactModel)
@@ -30,6 +31,7 @@ class Recipe:
     integrator: str = VERLET
     smooth_tools: bool = False
     surfaces: frozenset[str] = frozenset()
+    carry: bool = False
 
     @property
     def rotation(self) -> bool:

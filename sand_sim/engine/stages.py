@@ -224,7 +224,8 @@ def tool_stage(arrays: DemArrays, recorder, measuring: bool = False) -> None:
 def move_stage(arrays: DemArrays, recorder) -> None:
     """Advance all grains."""
     grains, lattice, setting, precision = arrays.grains, arrays.lattice, arrays.setting, arrays.recipe.precision
-    inputs = [grains.place, grains.remainder, grains.motion, grains.spin, grains.half_motion, grains.half_spin, grains.origin]
+    inputs = [grains.place, grains.remainder, grains.motion, grains.spin, grains.half_motion, grains.half_spin]
+    inputs += [grains.motion_carry, grains.spin_carry, grains.origin]
     inputs += [*gathered(arrays), grains.member, arrays.felt_force, arrays.felt_torque]
     inputs += [precision.vec3(*setting.gravity), setting.dt, lattice.quantum]
     inputs += [precision.whole3(*lattice.half_extent.tolist()), lattice.end]
@@ -238,7 +239,7 @@ def body_stage(arrays: DemArrays, recorder) -> None:
     grains, bodies, lattice, setting = arrays.grains, arrays.bodies, arrays.lattice, arrays.setting
     precision, flags = arrays.recipe.precision, arrays.flags
     inputs = [bodies.starts, bodies.sphere_at, bodies.offset, bodies.place, bodies.remainder, bodies.motion]
-    inputs += [bodies.half_motion, bodies.turn, bodies.momentum, bodies.inertia]
+    inputs += [bodies.half_motion, bodies.motion_carry, bodies.turn, bodies.momentum, bodies.inertia]
     inputs += [grains.place, grains.motion, grains.spin, grains.half_motion, grains.half_spin, grains.origin]
     inputs += [arrays.felt_force, arrays.felt_torque]
     inputs += [precision.vec3(*setting.gravity), setting.dt, lattice.quantum]

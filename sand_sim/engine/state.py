@@ -64,6 +64,8 @@ def _whole_arrays(arrays: DemArrays) -> dict[str, wp.array]:
         "spin",
         "half_motion",
         "half_spin",
+        "motion_carry",
+        "spin_carry",
         "member",
         "material",
         "identity",
@@ -76,7 +78,7 @@ def _whole_arrays(arrays: DemArrays) -> dict[str, wp.array]:
     found |= {f"{name}.starts": contacts.starts for name, contacts in arrays.lists.items()}
     found["met.starts"] = arrays.met.starts
     if arrays.bodies:
-        names = ("sphere_at", "place", "remainder", "motion", "half_motion", "turn", "momentum")
+        names = ("sphere_at", "place", "remainder", "motion", "half_motion", "motion_carry", "turn", "momentum")
         found |= {f"bodies.{name}": getattr(arrays.bodies, name) for name in names}
     if tools:
         names = ("tracks", "states", "travelled", "wrench", "impulse", "work")

@@ -267,3 +267,18 @@ def test_sheet_weighs_what_its_thickness_says(make_bodies, tmp_path):
         assert np.array_equal(made[0].shape.centres, made[1].shape.centres)
     with pytest.raises(SceneError, match="thickness"):
         make_bodies({"sheet": body | {"thickness": 0.0}})
+
+
+def test_short_steps_let_a_body_fall_as_fast_as_long_ones(make_bodies):
+    stiff = MATERIALS | {"stone": MATERIALS["stone"] | {"young": 1e10}}
+    pair = {"spheres": [[0.0, 0.0, 0.0, 0.001], [0.001, 0.0, 0.0, 0.001]], "velocity": [0.0, 0.0, -1.2]}
+    world = make_bodies({"pair": pair}, precision="single", materials=stiff, gravity=[0.0, 0.0, -9.81])
+    assert 9.81 * world.time_step < 60 * np.spacing(np.float32(1.2))
+    world.step(5000)
+    assert -(world.observe().body("pair").velocity[2] + 1.2) / world.time == pytest.approx(9.81, rel=1e-4)
+
+
+def test_a_body_that_starts_outside_of_the_domain_is_refused(make_bodies):
+    ball = {"spheres": [[0.0, 0.0, 0.0, 0.01]]}
+    with pytest.raises(SceneError, match=r"domain: 1 of 2 grains start outside of it, the first at \[3\.0, 0\.0, 0\.0\] m"):
+        make_bodies({"near": ball, "far": ball | {"pose": {"position": [3.0, 0.0, 0.0]}}})

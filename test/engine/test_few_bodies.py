@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 from scenes import floor, record
 
+from sand_sim import SceneError
+
 SAND = {"density": 2650.0, "young": 1e7, "poisson": 0.3}
+GRAVITY = [0.0, 0.0, -9.81]
+HIGH = {"low": [-0.1, -0.1, -0.01], "high": [0.1, 0.1, 0.4]}
 
 
 @pytest.mark.parametrize("precision", ["double", "single"])
@@ -66,6 +70,56 @@ def test_bouncing_ball(make_world):
     assert time[z > 0.0][-1] == pytest.approx(over, rel=2e-2)
     world.step(round(0.1 / world.time_step))
     assert radius - world.observe().grains.position[0, 2] == pytest.approx(dent, rel=1e-3)
+
+
+@pytest.mark.parametrize("x", [0.11, 0.5, -3.0])
+def test_grains_that_start_outside_of_the_domain_are_refused(make_world, x):
+    """Those next to it and those beyond all lattice coordinates; the good ones are not lost instead."""
+    with pytest.raises(SceneError, match="domain: 1 of 3 grains start outside of it, the first at"):
+        make_world([[0.0, 0.0, 0.1], [x, 0.0, 0.1], [0.0, 0.0, 0.2]], 0.005, domain=HIGH, precision="single")
+
+
+@pytest.mark.parametrize("integrator", ["velocity_verlet", "symplectic_euler"])
+@pytest.mark.parametrize(("young", "speed"), [(1e9, 3.0), (7e10, 1.2)])
+def test_short_steps_fall_as_fast_as_long_ones(make_world, young, speed, integrator):
+    """A step of gravity is a few units in the last place of a float32 velocity; rounded alike each time, it would not be 9.81."""
+    world = make_world(
+        [[0.0, 0.0, 0.3]],
+        0.0005,
+        velocity=[0.0, 0.0, -speed],
+        material=SAND | {"young": young},
+        gravity=GRAVITY,
+        boundaries=floor(),
+        domain=HIGH,
+        precision="single",
+        integrator=integrator,
+    )
+    assert 9.81 * world.time_step < 60 * np.spacing(np.float32(speed))
+    world.step(5000)
+    velocity = world.observe().grains.velocity[0, 2]
+    assert -(velocity + speed) / world.time == pytest.approx(9.81, rel=1e-4)
+
+
+def test_short_steps_slow_a_sliding_sphere(make_world):
+    """By ``mu g``, while it takes up spin at ``5/2 mu g/R``."""
+    radius, friction, young = 0.0005, 0.3, 1e9
+    mass = 2650.0 * 4 / 3 * np.pi * radius**3
+    dent = (3.0 * mass * 9.81 * (1.0 - 0.3**2) / (4.0 * young * np.sqrt(radius))) ** (2.0 / 3.0)
+    world = make_world(
+        [[0.0, 0.0, radius - dent]],
+        radius,
+        velocity=[1.0, 0.0, 0.0],
+        material=SAND | {"young": young},
+        friction=friction,
+        gravity=GRAVITY,
+        boundaries=floor(),
+        domain=HIGH,
+        precision="single",
+    )
+    world.step(round(0.01 / world.time_step))
+    grains = world.observe().grains
+    assert (1.0 - grains.velocity[0, 0]) / world.time == pytest.approx(friction * 9.81, rel=1e-3)
+    assert grains.spin[0, 1] / world.time == pytest.approx(2.5 * friction * 9.81 / radius, rel=1e-3)
 
 
 def gas(number=60, seed=0):
