@@ -17,6 +17,7 @@ from sand_sim.precision import Precision
 SOLID_FRACTION = 0.6  # of the sand that a water saturation is reckoned for
 BRIDGES = 6.0  # per grain in that sand
 _NEWTON_STEPS = 8
+_NARROWEST = 4.0 ** (-2.0 / 3.0)  # patch of a stuck contact as it tears, over that at touch
 _ROOTS, _ROOT_STEPS = 5, 4  # within 2 % first, for all that the two precisions hold of lengths in metres, then to the last digit
 
 
@@ -170,6 +171,24 @@ def build_two_thirds(precision: Precision) -> wp.Function:
     return two_thirds
 
 
+def build_stuck_patch(precision: Precision, types: ContactTypes) -> wp.Function:
+    """Warp function ``(contact, pair, b_0) -> b``: radius of a stuck contact's patch, from that at touch, by Newton's method."""
+    real = precision.real
+
+    @wp.func
+    def stuck_patch(contact: types.contact, pair: types.pair, unloaded: real) -> real:
+        narrowest = real(wp.static(_NARROWEST * (1.0 + 2.0**-20))) * unloaded
+        wide = contact.patch + unloaded
+        for _ in range(wp.static(_NEWTON_STEPS)):
+            root = pair.adhesion_root * wp.sqrt(wide)
+            miss = wide * wide / contact.radius - root - contact.overlap
+            slope = real(2.0) * wide / contact.radius - real(0.5) * root / wide
+            wide = wp.max(wide - miss / slope, narrowest)
+        return wide
+
+    return stuck_patch
+
+
 def build_jkr(precision: Precision, types: ContactTypes) -> wp.Function:
     """Adhesion of soft grains: the contact patch is wider than Hertz's and holds on until it is torn.
 
@@ -179,7 +198,7 @@ def build_jkr(precision: Precision, types: ContactTypes) -> wp.Function:
 
     Source: Johnson, Kendall & Roberts 1971, https://doi.org/10.1098/rspa.1971.0141.
     """
-    real, two_thirds = precision.real, build_two_thirds(precision)
+    real, two_thirds, stuck_patch = precision.real, build_two_thirds(precision), build_stuck_patch(precision, types)
 
     @wp.func
     def jkr(contact: types.contact, pair: types.pair, stuck: real):
@@ -189,16 +208,11 @@ def build_jkr(precision: Precision, types: ContactTypes) -> wp.Function:
         attraction = real(0.0)
         if holds > real(0.0):
             unloaded = two_thirds(contact.radius * pair.adhesion_root)
-            narrowest = real(wp.static(4.0 ** (-2.0 / 3.0))) * unloaded
+            narrowest = real(wp.static(_NARROWEST)) * unloaded
             if contact.overlap < real(-3.0) * narrowest * narrowest / contact.radius:
                 holds = real(0.0)
             else:
-                wide = contact.patch + unloaded
-                for _ in range(wp.static(_NEWTON_STEPS)):
-                    root = pair.adhesion_root * wp.sqrt(wide)
-                    miss = wide * wide / contact.radius - root - contact.overlap
-                    slope = real(2.0) * wide / contact.radius - real(0.5) * root / wide
-                    wide = wp.max(wide - miss / slope, narrowest * (real(1.0) + real(wp.static(2.0**-20))))
+                wide = stuck_patch(contact, pair, unloaded)
                 cube = wide * wide * wide
                 # sqrt(8 pi w E* b^3) = 2 E* sqrt(2 pi w / E*) b^(3/2)
                 whole = real(4.0) / real(3.0) * pair.adhesion_young * cube / contact.radius
@@ -208,6 +222,32 @@ def build_jkr(precision: Precision, types: ContactTypes) -> wp.Function:
         return attraction, holds
 
     return jkr
+
+
+def build_jkr_energy(precision: Precision, types: ContactTypes) -> wp.Function:
+    """Energy of a stuck contact, from touch on, less that of the Hertz force, which the normal law counts.
+
+    With ``s = sqrt(2 pi w / E*)`` and the patch b, the integral of the force over the overlap is
+    ``E* (8/15 b^5/R*^2 - 4/3 s b^(7/2)/R* + 1/2 s^2 b^2)``; at touch ``b_0 = (R* s)^(2/3)``, and it is ``-3/10 E* b_0^5/R*^2``.
+    """
+    real, two_thirds, stuck_patch = precision.real, build_two_thirds(precision), build_stuck_patch(precision, types)
+
+    @wp.func
+    def jkr_energy(contact: types.contact, pair: types.pair, stuck: real) -> real:
+        energy = real(0.0)
+        if stuck > real(0.0):
+            unloaded = two_thirds(contact.radius * pair.adhesion_root)
+            wide = stuck_patch(contact, pair, unloaded)
+            bond = pair.adhesion_root * contact.radius / (wide * wp.sqrt(wide))  # from 1 at touch to 4 where it tears
+            flat = wide * wide / contact.radius
+            at_touch = unloaded * unloaded / contact.radius
+            energy = flat * flat * wide * (real(8.0) / real(15.0) - real(4.0) / real(3.0) * bond + real(0.5) * bond * bond)
+            energy += real(0.3) * at_touch * at_touch * unloaded
+            overlap = wp.max(contact.overlap, real(0.0))
+            energy -= real(8.0) / real(15.0) * contact.patch * overlap * overlap
+        return pair.adhesion_young * energy
+
+    return jkr_energy
 
 
 def prepare_jkr(pair: PairNumbers) -> dict[str, float]:
@@ -245,6 +285,7 @@ COHESION_LAWS = {
     ),
     "jkr": CohesionLaw(
         build_jkr,
+        build_jkr_energy,
         fields={"adhesion_young": "[Pa] E*", "adhesion_root": "[sqrt(m)] sqrt(2 pi w / E*)"},
         prepare=prepare_jkr,
         asks=("adhesion",),

@@ -131,11 +131,39 @@ def test_jkr_pulls_off_with_3_2_pi_w_r(make_world, precision):
     """
     gap, pull = pulls(bounce(make_world, "jkr", precision, 1e-5), 550)
     assert pull.max() == pytest.approx(1.5 * np.pi * ADHESION * WIDE / 2.0, rel=5e-3)
-    cost = 7.09 * (ADHESION**5 * (WIDE / 2.0) ** 4 / EFFECTIVE**2) ** (1.0 / 3.0)
-    assert loss(make_world, "jkr", precision) == pytest.approx(cost, rel=1e-2)
+    assert loss(make_world, "jkr", precision) == pytest.approx(JKR_COST, rel=1e-2)
     torn = gap[pull > 0.1 * pull.max()].max()
     patch = (np.pi * ADHESION * (WIDE / 2.0) ** 2 / (8.0 * EFFECTIVE)) ** (1.0 / 3.0)
     assert torn == pytest.approx(3.0 * patch**2 / (WIDE / 2.0), rel=2e-2)
+
+
+JKR_COST = 7.09 * (ADHESION**5 * (WIDE / 2.0) ** 4 / EFFECTIVE**2) ** (1.0 / 3.0)  # [J] to tear a contact, from touch
+
+
+def test_jkr_keeps_account_of_its_energy(make_world):
+    """Nothing is dissipated while grains stick, but for the step in which the pull sets in; once torn apart, the cost is."""
+    world = bounce(make_world, "jkr", "double", 1e-6)
+    sticking = []
+    while len(sticking) < 2 or world.observe().health.contacts:
+        world.step(50)
+        sticking.append(world.observe().health.dissipated)
+    assert abs(sticking[0]) < 1.5 * np.pi * ADHESION * WIDE / 2.0 * 0.02 * 1e-6
+    assert np.ptp(sticking[:-1]) < 1e-3 * JKR_COST
+    assert sticking[-1] == pytest.approx(JKR_COST, rel=1e-2)
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+@pytest.mark.parametrize("share", [0.3, 0.9])
+def test_grains_that_meet_with_too_little_energy_to_part_stick(make_world, share, precision):
+    """They swing about where they balance, for ever."""
+    speed = -np.sqrt(2.0 * share * JKR_COST / (0.5 * mass_of(WIDE)))
+    world = pair(make_world, "jkr", WIDE, 1e-9, speed, precision=precision, numbers={"adhesion": ADHESION}, time_step=1e-6)
+    for _ in range(10):
+        world.step(5000)
+        health = world.observe().health
+        assert health.contacts == 1
+        assert abs(health.dissipated) < 2e-3 * JKR_COST
+        assert health.doubts == ()
 
 
 @pytest.mark.parametrize(("share", "holds"), [(0.97, True), (1.03, False)])
