@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from sand_sim.body_model import BodyModel, lighten, model_body
+from sand_sim.domain import make_lattice
 from sand_sim.engine.arrays import DemArrays, Setting
 from sand_sim.engine.device import open_device
 from sand_sim.engine.explicit_dem import ExplicitDem
@@ -27,7 +28,6 @@ from sand_sim.tool_model import Progress, ToolModel, model_tool
 
 _SKIN = 0.25  # of the mean grain radius
 _SPHERES_PER_THREAD = 1000
-_MARGIN = 0.25  # of the scene's largest edge, free around everything in it
 _ROUNDED = 1e-3  # of the acceleration of gravity, that rounding may take off or add, before what it does is carried over
 _FLOOR = 0.05  # a plane whose normal points up by at least this much is a floor
 
@@ -133,8 +133,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     light = lighten(scene, table, order)
     time_step, frame_steps = _time_step(light, table, smallest, walls, tools, grounds)
     precision = PRECISIONS[scene.solver.precision]
-    lattice = _lattice(scene, table, walls, tools, grounds, precision)
-    _check_inside(table, lattice)
+    lattice = make_lattice(scene, table, walls, tools, grounds, precision)
     recipe = Recipe(
         contact=scene.contact,
         precision=precision,
@@ -166,16 +165,17 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         make_plungers(walls, float(table.mass[table.lone].sum() + table.bodies.mass.sum())),
         solver=None,
     )
-    return replace(assembly, solver=build_solver(assembly, setting, device))
+    return replace(assembly, solver=build_solver(assembly, setting, device, progress))
 
 
-def build_solver(assembly: Assembly, setting: Setting, device) -> ExplicitDem:
+def build_solver(assembly: Assembly, setting: Setting, device, progress: Progress = lambda stage, share: None) -> ExplicitDem:
     """A solver for an assembly that is complete but for its own.
 
     Args:
         assembly: what it runs; its grains start where the table has them.
         setting: its numbers; the reach is found here.
         device: from ``open_device``.
+        progress: called with the name of a stage of the preparation and the share of it that is done, 0 to 1.
 
     Raises:
         SceneError: if the walls cannot hold the grains.
@@ -193,7 +193,7 @@ def build_solver(assembly: Assembly, setting: Setting, device) -> ExplicitDem:
         device,
         assembly.plungers,
     )
-    return ExplicitDem(arrays, device)
+    return ExplicitDem(arrays, device, progress)
 
 
 def _open_device(scene: Scene, spheres: int):
@@ -260,48 +260,6 @@ def _fall_height(scene: Scene, table: GrainTable, walls: list[Wall], grounds: li
 def _loses_digits(scene: Scene, time_step: TimeStep, precision: Precision) -> bool:
     """Whether rounding the fastest velocity to expect may change it by a notable share of what gravity does in a step."""
     return 0.5 * precision.epsilon * time_step.speed > _ROUNDED * float(np.linalg.norm(scene.gravity)) * time_step.value > 0.0
-
-
-def _lattice(
-    scene: Scene, table: GrainTable, walls: list[Wall], tools: list[ToolModel], grounds: list[Ground], precision: Precision
-) -> Lattice:
-    reserve = 1.05 * max([tool.extent for tool in tools] + [float(np.linalg.norm(table.offset, axis=1).max(initial=0.0))])
-    if scene.domain is not None:
-        low, high = (np.asarray(corner, float) for corner in scene.domain)
-        for ground in grounds:
-            if not np.all((ground.place > low) & (ground.place < high)):
-                raise SceneError(f"domain: must contain the middle of terrain '{ground.name}', {ground.place.round(3).tolist()}")
-        return Lattice(low, high, precision, reserve)
-    corners = [table.position - table.radius[:, None], table.position + table.radius[:, None]]
-    for fill in scene.fills:
-        if fill.low is not None:
-            corners.append(np.array([fill.low, fill.high]))
-    for boundary in scene.boundaries:
-        if boundary.kind == "box":
-            corners.append(np.array([boundary.low, boundary.high]))
-    for wall in walls:
-        if wall.kind == "plane":  # where grains would hit it
-            corners.append(table.position - wall.distance(table.position)[:, None] * wall.direction)
-    for tool in tools:
-        poses = [tool.tool.pose, *(waypoint.pose for waypoint in tool.tool.trajectory)]
-        stops = np.array([pose.position for pose in poses])
-        corners += [stops - tool.extent, stops + tool.extent]
-    corners += [wall.corners for wall in walls if wall.kind == "shell"]
-    corners += [ground.mesh.bounds + ground.place for ground in grounds]
-    corners = np.concatenate(corners)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    margin = _MARGIN * float(np.max(high - low))
-    return Lattice(low - margin, high + margin, precision, reserve)
-
-
-def _check_inside(table: GrainTable, lattice: Lattice) -> None:
-    centres = np.concatenate([table.position[table.lone], table.bodies.position])
-    outside = np.any((centres < lattice.low) | (centres > lattice.high), axis=1)
-    if outside.any():
-        raise SceneError(
-            f"domain: {outside.sum()} of {len(centres)} grains start outside of it, the first at "
-            f"{centres[outside][0].round(6).tolist()} m; enlarge 'domain' or move them"
-        )
 
 
 def _pair_table(scene: Scene, order: list[str], precision: Precision) -> list[list]:

@@ -24,8 +24,8 @@ class Interruption:
         """Whether the user wants to stop."""
         return self._asked.is_set()
 
-    def check(self, *_) -> None:
-        """Raise ``InterruptedByUserError`` if the user wants to stop; takes any arguments, to serve as a progress callback."""
+    def check(self) -> None:
+        """Raise ``InterruptedByUserError`` if the user wants to stop."""
         if self.asked:
             raise InterruptedByUserError
 

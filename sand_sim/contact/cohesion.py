@@ -242,7 +242,7 @@ def build_jkr_energy(precision: Precision, types: ContactTypes) -> wp.Function:
             flat = wide * wide / contact.radius
             at_touch = unloaded * unloaded / contact.radius
             energy = flat * flat * wide * (real(8.0) / real(15.0) - real(4.0) / real(3.0) * bond + real(0.5) * bond * bond)
-            energy += real(0.3) * at_touch * at_touch * unloaded
+            energy += real(3.0) / real(10.0) * at_touch * at_touch * unloaded
             overlap = wp.max(contact.overlap, real(0.0))
             energy -= real(8.0) / real(15.0) * contact.patch * overlap * overlap
         return pair.adhesion_young * energy

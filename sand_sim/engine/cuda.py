@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import warp as wp
 
+from sand_sim.engine.compiling import compile_kernels
 from sand_sim.engine.count import Count
 from sand_sim.engine.kernel import fill_gaps
 from sand_sim.engine.lanes import RECORDING, available_cores
@@ -95,9 +96,9 @@ class CudaDevice:
         self.name, self.label = device.alias, f"{device.alias}, {device.name}"
         self.threads = device.sm_count * _THREADS_PER_MULTIPROCESSOR * _WAVES
 
-    def load(self, kernels: list[wp.Kernel]) -> None:
+    def load(self, kernels: list[wp.Kernel], progress: Callable[[str, float], None]) -> None:
         """Compile what is not in Warp's cache, on several threads, and load it all; nothing can be loaded while recording."""
-        wp.force_load(self.name, [one.module for one in kernels], block_dim=_BLOCK, max_workers=available_cores())
+        compile_kernels(kernels, self.name, available_cores(), progress, block_dim=_BLOCK)
 
     def record(self, program: Callable[[CudaRecorder], None]) -> Callable[[], None]:
         """Record a program as one graph.

@@ -1,5 +1,6 @@
 """The explicit DEM solver: runs its recorded stages, makes room where lists grow, and gives away its whole state."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,13 +48,14 @@ class ExplicitDem:
     Args:
         arrays: state and scratch.
         device: the arrays', from ``device.open_device``.
+        progress: called with the name of a stage of the preparation and the share of it that is done, 0 to 1.
     """
 
-    def __init__(self, arrays: DemArrays, device):
+    def __init__(self, arrays: DemArrays, device, progress: Callable[[str, float], None] = lambda stage, share: None):
         self.arrays, self.device = arrays, device
         self.stages = choose_stages(arrays)
         self._programs = {}
-        device.load(list_kernels(arrays, self.stages, device))
+        device.load(list_kernels(arrays, self.stages, device), progress)
         arrays.flags.starting.fill_(1)
         self.expect_moves()
 

@@ -13,6 +13,7 @@ from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 
 import warp as wp
 
+from sand_sim.engine.compiling import compile_kernels
 from sand_sim.engine.count import Count
 from sand_sim.engine.kernel import fill_gaps, kernel
 
@@ -136,9 +137,9 @@ class CpuDevice:
         self.meeting_arguments = [self._meeting, self.lanes, _SPINS_BEFORE_YIELD, wp.uint64(give_way)]
         self._threads = ThreadPoolExecutor(self.lanes, thread_name_prefix="sand_sim lane")
 
-    def load(self, kernels: list[wp.Kernel]) -> None:
+    def load(self, kernels: list[wp.Kernel], progress: Callable[[str, float], None]) -> None:
         """Compile what is not in Warp's cache, on several threads, and load it all."""
-        wp.force_load("cpu", [one.module for one in kernels], max_workers=available_cores())
+        compile_kernels(kernels, "cpu", available_cores(), progress)
 
     def record(self, program: Callable[[LaneRecorder], None]) -> Callable[[], None]:
         """Record a program once per lane.

@@ -21,6 +21,7 @@ def main(arguments: list[str] | None = None) -> int:
     from rclpy.signals import SignalHandlerOptions
 
     from sand_sim.node.node import SandSimNode
+    from sand_sim.node.preparing import Preparation
     from sand_sim.node.transport import enlarge_shared_memory
     from sand_sim.scene.types import SceneError
 
@@ -33,7 +34,7 @@ def main(arguments: list[str] | None = None) -> int:
     executor, node = SingleThreadedExecutor(), None
     try:
         interruption.check()
-        node = SandSimNode(progress=interruption.check)
+        node = SandSimNode(progress=Preparation(interruption.check, rclpy.logging.get_logger("sand_sim").info))
         executor.add_node(node)
         if node.parameters["autostart"]:
             node.start()
