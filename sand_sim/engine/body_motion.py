@@ -159,7 +159,7 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
             y = at[1] + whole(jump[1])
             z = at[2] + whole(jump[2])
             if wp.abs(x) > half_extent[0] or wp.abs(y) > half_extent[1] or wp.abs(z) > half_extent[2]:
-                height = -wp.dot(gravity, vec3(real(at[0]), real(at[1]), real(at[2])) * quantum)
+                height = -wp.dot(gravity, vec3(real(x), real(y), real(z)) * quantum)
                 wp.atomic_add(carried_off, lane, wp.float64(old[3] * (real(0.5) * wp.dot(now, now) + height)))
                 body_place[b] = whole4(parking, parking, parking, whole(0))
                 for m in range(first, last):

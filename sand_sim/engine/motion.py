@@ -171,7 +171,7 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
             z = here[2] + whole(jump[2])
             if wp.abs(x) > half_extent[0] or wp.abs(y) > half_extent[1] or wp.abs(z) > half_extent[2]:
                 now = motion[i]
-                height = -wp.dot(gravity, vec3(real(here[0]), real(here[1]), real(here[2])) * quantum)
+                height = -wp.dot(gravity, vec3(real(x), real(y), real(z)) * quantum)
                 energy = now[3] * (real(0.5) * (now[0] * now[0] + now[1] * now[1] + now[2] * now[2]) + height)
                 wp.atomic_add(carried_off, lane, wp.float64(energy))
                 place[i] = whole4(parking, parking, parking, whole(0))

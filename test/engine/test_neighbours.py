@@ -97,6 +97,17 @@ def test_grains_that_leave_are_counted_and_retired(make_world):
     assert np.array_equal(np.unique(observation.grains.identity), observation.grains.identity)
 
 
+def test_grains_that_fall_out_take_their_energy_along(make_world):
+    """Height and motion are those of the same moment; one step apart they would differ by ``m g v dt``."""
+    domain = {"low": [-0.05] * 3, "high": [0.05] * 3}
+    world = make_world([[0.0, 0.0, 0.0]], 0.002, gravity=[0.0, 0.0, -9.81], domain=domain, precision="double")
+    world.step(round(0.15 / world.time_step))
+    health = world.observe().health
+    assert health.retired == 1
+    step = 2500.0 * 4.0 / 3.0 * np.pi * 0.002**3 * 9.81 * np.sqrt(2.0 * 9.81 * 0.05) * world.time_step
+    assert health.dissipated == pytest.approx(0.0, abs=1e-3 * step)
+
+
 def untouched(world):
     """Pairs that overlap but are not on the list."""
     grains = world.observe().grains
