@@ -37,6 +37,9 @@ def _run(options: argparse.Namespace) -> int:
     start_warp()
     begin = time.perf_counter()
     path = locate_mesh(options.mesh)
+    for written in (options.output, options.rrd):
+        if written and not written.parent.is_dir():
+            raise MeshError(f"cannot write {written}: there is no folder {written.parent}")
     recording = None
     if options.rrd:
         from sampler.recording import Recording
@@ -55,7 +58,7 @@ def _run(options: argparse.Namespace) -> int:
     )
     bar.end()
     sampled = time.perf_counter()
-    mass = body.mass_properties(options.density, options.mass) if options.density or options.mass else None
+    mass = body.mass_properties(options.density, options.mass) if (options.density, options.mass) != (None, None) else None
     seconds = {"sampling": sampled - begin}
     if recording:
         distance = SignedDistance(read_mesh(path, options.scale), options.device, options.thickness or 2.0 * options.radius)

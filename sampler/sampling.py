@@ -12,6 +12,7 @@ from sampler.gaps import measure_evenness
 from sampler.inset import inset_particles
 from sampler.lattice import lattice_spacing, particle_count
 from sampler.mass import integrate, is_physical
+from sampler.options import check_options
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
 from sampler.sheets import beyond_rims, closed_triangles, thick_plates
 from sampler.skin import Skin, free_triangles, touchable_parts, winding_before
@@ -63,13 +64,11 @@ def sample_body(
         observe: called with the particles, shape (n, 3) [m], as they relax.
 
     Raises:
-        MeshError: if a number is not positive, the mesh cannot be repaired, the particles would be too many to be meant, or a
+        MeshError: if an option makes no sense, the mesh cannot be repaired, the particles would be too many to be meant, or a
             grain could pass.
     """
-    given = {"radius": radius, "spacing": spacing, "count": count, "smallest grain": grain, "sheet thickness": thickness}
-    for name, value in given.items():
-        if value is not None and not (np.isfinite(value) and value > 0.0):
-            raise MeshError(f"particle {name} must be positive, got {value}")
+    lengths = {"radius": radius, "spacing": spacing, "smallest grain": grain, "sheet thickness": thickness}
+    check_options(lengths, count, seed, device)
     repaired = mesh if isinstance(mesh, RepairedMesh) else repair_mesh(mesh, sheets)
     thickness = 2.0 * radius if thickness is None else thickness
     closed, owner = closed_triangles(repaired, thickness)

@@ -148,6 +148,22 @@ def test_same_seed_same_body(sphere):
 
 
 @pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"radius": "wide"}, "radius must be positive, got 'wide'"),
+        ({"spacing": float("nan")}, "spacing must be positive"),
+        ({"count": 10.5}, "count must be a whole number from 1 on, got 10.5"),
+        ({"count": True}, "count must be a whole number"),
+        ({"seed": -1}, "seed must be a whole number from 0 on"),
+        ({"device": "abacus"}, "device 'abacus' is not here; present are cpu"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(sphere, options, reason):
+    with pytest.raises(MeshError, match=reason):
+        sample_body(sphere, **{"radius": 0.1} | options)
+
+
+@pytest.mark.parametrize(
     ("radius", "reason"), [(0.0, "must be positive"), (-1.0, "must be positive"), (1e-6, "check the mesh's scale")]
 )
 def test_radii_that_make_no_sense_are_refused(sphere, radius, reason):
