@@ -19,6 +19,7 @@ _WIDE = 4.0  # triangles with longer edges, in roots of their area, are needles
 _SHUT = 0.005  # width of slits whose walls are no skin, in spacings
 _SPECK = 0.01  # area of a speck, in squared spacings
 _MOST, _FINEST = 10, 0.5  # cuts per particle to come, after which only triangles longer than so many spacings are cut
+_ENOUGH = 15_000  # cuts for a body of few particles, whose mass is to be right, too
 
 
 class Skin(Surface):
@@ -67,7 +68,7 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
     if _ask(places, normals, around)[0].all():
         return triangles, parent, np.ones(len(parent), int)
-    most = len(triangles) // 2 + _MOST * float(Surface.areas_of(triangles).sum()) / spacing**2
+    most = len(triangles) // 2 + max(_MOST * float(Surface.areas_of(triangles).sum()) / spacing**2, _ENOUGH)
     pieces, parents, cuts = [], [], 0
     for _ in range(_DEEPEST):
         edge = _longest_edges(triangles)
