@@ -1,9 +1,11 @@
 """From a scene file (YAML) to a checked ``Scene``."""
 
+import math
 from pathlib import Path
 
 import yaml
 
+from sand_sim.contact.cohesion import bridge_share
 from sand_sim.contact.law import ASKS
 from sand_sim.contact.model import SLOTS, ContactModel
 from sand_sim.integrator import INTEGRATORS, VERLET
@@ -228,9 +230,18 @@ def _contact(entry: Field) -> ContactModel:
 
 
 def _liquid(entry: Field) -> Liquid:
-    entry.keys(("saturation", "surface_tension", "contact_angle"), required=("saturation",))
+    entry.keys(("saturation", "bridge_volume", "surface_tension", "contact_angle"))
+    if ("saturation" in entry) == ("bridge_volume" in entry):
+        raise entry.refuse("give exactly one of 'saturation' of the pores and 'bridge_volume' over the cube of a radius")
+    most = 0.3  # the pendular regime, where liquid sits in single bridges
+    whole = 4.0 / 3.0 * math.pi * bridge_share(1.0)  # bridge over the cube of a radius in sand that is full
+    saturation = (
+        entry["saturation"].number(above=0.0, most=most)
+        if "saturation" in entry
+        else entry["bridge_volume"].number(above=0.0, most=most * whole) / whole
+    )
     return Liquid(
-        saturation=entry["saturation"].number(above=0.0, most=0.3),  # the pendular regime, where liquid sits in single bridges
+        saturation=saturation,
         surface_tension=entry.optional("surface_tension", lambda f: f.number(above=0.0, unit="N/m"), 0.072),
         contact_angle=entry.optional("contact_angle", lambda f: f.number(least=0.0, most=0.9, unit="rad"), 0.0),
     )

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 from scenes import record
 
-from sand_sim.contact.cohesion import bridge_share
-
 POISSON, DENSITY = 0.3, 2650.0
 
 
@@ -40,9 +38,7 @@ def pulls(world, steps):
 RADIUS = 5e-4
 VOLUME = 0.01 * RADIUS**3
 RUPTURE = VOLUME ** (1.0 / 3.0)
-# Saturation for which a bridge gets that volume.
-SATURATION = VOLUME / (4 / 3 * np.pi * RADIUS**3) / bridge_share(1.0)
-LIQUID = {"saturation": SATURATION, "surface_tension": 0.073, "contact_angle": 0.0}
+LIQUID = {"bridge_volume": VOLUME / RADIUS**3, "surface_tension": 0.073, "contact_angle": 0.0}
 
 
 @pytest.mark.parametrize("precision", ["double", "single"])

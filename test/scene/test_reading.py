@@ -80,6 +80,8 @@ def test_good_scene_is_read():
         (("solver",), {"precision": "half"}, "solver.precision: unknown 'half'"),
         (("gravity",), [0, 0], "gravity: must be a list of 3 numbers"),
         (("domain",), {"low": [0, 0, 0], "high": [0.05, 1, 1]}, "domain: must contain the region of fill"),
+        (("liquid",), {"surface_tension": 0.07}, "liquid: give exactly one of 'saturation' of the pores and 'bridge_volume'"),
+        (("liquid",), {"bridge_volume": 0.5}, "liquid.bridge_volume: must be greater than 0 and at most 0.279"),
         (("frame_rate",), 0, "frame_rate: must be greater than 0"),
         (("fills",), [], "fills: at least one fill, or one of 'bodies', is needed"),
     ],
