@@ -22,12 +22,13 @@ PARAMETERS = {
     "output": ("", "Folder for summary, history and figure at the end; empty for none.", str),
     "view": ("false", "Open the Rerun viewer.", bool),
 }
+ENDING = "60"  # [s] that the node may take to write recording, history and figure
 CONFIG = Path(__file__).parent.parent / "config"
 OTHERS = {
     "name": ("sand_sim", "Name of the node."),
     "namespace": ("", "Namespace of the node."),
     "params_file": (str(CONFIG / "ros" / "node.yaml"), "Further parameters, those above taking precedence."),
-    "rviz": ("false", "Open RViz with tools, grains and contact forces."),
+    "rviz": ("false", "Open RViz with tools, grains and contact forces; set up for /sand_sim, a bucket, and world."),
 }
 
 
@@ -42,6 +43,8 @@ def generate_launch_description() -> LaunchDescription:
         name=LaunchConfiguration("name"),
         namespace=LaunchConfiguration("namespace"),
         output="screen",
+        sigterm_timeout=ENDING,  # a second signal means: at once, and what is being written is lost
+        sigkill_timeout=ENDING,
         parameters=[ParameterFile(LaunchConfiguration("params_file"), allow_substs=True), parameters],
     )
     rviz = Node(

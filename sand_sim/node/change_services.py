@@ -73,6 +73,8 @@ class ChangeServices:
         if len(points) > _MOST_GRAINS:
             raise ArgumentError(f"argument 'position': {len(points)} grains are more than {_MOST_GRAINS} at once")
         speeds = 0.0 if velocity is None else _triples("velocity", velocity)
+        if velocity is not None and len(speeds) not in (1, len(points)):
+            raise ArgumentError(f"argument 'velocity': must be x y z of one or of all {len(points)} grains, not of {len(speeds)}")
 
         def act() -> str:
             identities = self._world.add_grains(points, radius, material, speeds)
@@ -83,7 +85,7 @@ class ChangeServices:
     def _remove(self, id: list | None = None, low: list | None = None, high: list | None = None):
         if (id is None) == (low is None) or (low is None) != (high is None):
             raise ArgumentError("give either 'id', or 'low' and 'high' of a box")
-        box = None if low is None else (_triples("low", low)[0], _triples("high", high)[0])
+        box = None if low is None else (_triples("low", low, 1)[0], _triples("high", high, 1)[0])
         identity = None if id is None else np.array(id)
         return self._simulation.change(lambda: f"{len(self._world.remove_grains(identity, box))} grains")
 
@@ -101,7 +103,7 @@ class ChangeServices:
         return self._simulation.change(act)
 
 
-def _triples(name: str, values: Any) -> np.ndarray:
-    if not len(values) or len(values) % 3:
-        raise ArgumentError(f"argument '{name}': must be x y z of one or more, not {len(values)} numbers")
+def _triples(name: str, values: Any, number: int | None = None) -> np.ndarray:
+    if not len(values) or len(values) % 3 or len(values) != 3 * (number or len(values) / 3):
+        raise ArgumentError(f"argument '{name}': must be x y z of {number or 'one or more'}, not {len(values)} numbers")
     return np.array(values, float).reshape(-1, 3)

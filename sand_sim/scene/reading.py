@@ -37,6 +37,19 @@ _TOOL_FIELDS = ("mesh", "urdf", "link", "material", "particle_radius", "particle
 _TOOL_FIELDS += ("pose", "max_speed", "trajectory")
 
 
+class _Loader(yaml.SafeLoader):
+    """Refuses a key that is there twice, of which the last would win in silence."""
+
+    def compose_mapping_node(self, anchor):
+        node, seen = super().compose_mapping_node(anchor), set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if key.value in seen:
+                    raise yaml.MarkedYAMLError(problem=f"'{key.value}' is there twice", problem_mark=key.start_mark)
+                seen.add(key.value)
+        return node
+
+
 def load_scene(path: str | Path) -> Scene:
     """Read and check a scene file.
 
@@ -48,7 +61,7 @@ def load_scene(path: str | Path) -> Scene:
     """
     path = Path(path)
     try:
-        parsed = yaml.safe_load(path.read_text())
+        parsed = yaml.load(path.read_text(), _Loader)
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:
@@ -196,8 +209,8 @@ def _tool(name: str, entry: Field) -> Tool:
         raise entry["urdf"].refuse("needs a 'link' instead of a 'mesh'")
     if "link" in entry and "scale" in entry:
         raise entry["scale"].refuse("a URDF is in metres and scales its meshes itself; leave it out")
-    if not name.isidentifier():
-        raise entry.refuse("a tool's name becomes part of its topics: letters, digits and underscores only")
+    if not (name.isidentifier() and name.isascii()):
+        raise entry.refuse("a tool's name becomes part of its topics: letters of ASCII, digits and underscores only")
     track = []
     for stop in entry["trajectory"].entries() if "trajectory" in entry else []:
         stop.keys(("time", "phase", "position", "orientation", "rpy"), required=("time",))

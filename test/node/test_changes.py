@@ -84,12 +84,18 @@ def test_grains_come_and_go(client, start_node):
         ({"position": [0.1, 0.1, 0.05]}, "argument 'radius' is missing"),
         ({"position": [0.1, 0.1, 0.05], "radius": "big"}, "argument 'radius': must be double, not string"),
         ({"position": [9.9, 0.1, 0.05], "radius": 0.005}, "domain"),
+        (
+            {"position": [0.1, 0.1, 0.05] * 3, "radius": 0.005, "velocity": [0.0, 0.0, -0.1] * 2},
+            "argument 'velocity': must be x y z of one or of all 3 grains, not of 2",
+        ),
         ({"position": [0.1, 0.1, 0.05], "radius": 0.005, "colour": "red"}, "unknown argument 'colour'"),
     ):
         good, told = ask(client, "spawn_grains", **arguments)
         assert not good
         assert reason in told
     assert not ask(client, "remove_grains")[0]
+    good, told = ask(client, "remove_grains", low=[0.0] * 6, high=[0.2, 0.2, 0.2])
+    assert (good, told) == (False, "argument 'low': must be x y z of 1, not 6 numbers")
     assert not ask(client, "remove_grains", id=[4000])[0]
     odd = SetParametersAtomically.Request(parameters=[ParameterMessage(name="radius", value=ParameterValue(type=200))])
     assert "there is no type 200" in client.call(SetParametersAtomically, "spawn_grains", odd).result.reason

@@ -53,6 +53,7 @@ def test_launch_arguments_are_parameters_of_the_node(launch_file):
     assert all(entry["description"] for entry in declared.values())
     (node,) = (entry for entry in entries if type(entry).__name__ == "LifecycleNode")
     assert set(node.named["parameters"][1]) == set(launch_file.PARAMETERS)
+    assert float(node.named["sigterm_timeout"]) >= 30.0, "a second signal would end it before it has written its files"
     assert Path(declared["params_file"]["default_value"]).is_file()
     defaults = {declaration.name: declaration.default for declaration in DECLARATIONS}
     for name, (default, _, kind) in launch_file.PARAMETERS.items():

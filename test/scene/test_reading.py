@@ -75,6 +75,7 @@ def test_good_scene_is_read():
         ),
         (("tools", "spade", "trajectory"), [{"time": 1}, {"time": 1}], "tools.spade.trajectory[1].time: must be later"),
         (("tools", "my spade"), GOOD["tools"]["spade"], "tools.my spade: a tool's name becomes part of its topics"),
+        (("tools", "sch\u00fcrfe"), GOOD["tools"]["spade"], "a tool's name becomes part of its topics"),
         (("contact",), {"normal": "hertzz"}, "contact.normal: unknown 'hertzz'; known are"),
         (("solver",), {"time_step": -1}, "solver.time_step: must be greater than 0 [s]"),
         (("solver",), {"precision": "half"}, "solver.precision: unknown 'half'"),
@@ -99,6 +100,7 @@ def test_refusals_name_the_field_and_the_fix(path, value, named):
         ("- 1\n- 2", "must be a mapping"),
         ("", "must be a mapping"),
         ("\x00", "is not valid YAML"),
+        ("tools:\n  spade: {}\n  spade: {}", "'spade' is there twice"),
     ],
 )
 def test_unreadable_files_are_refused_in_one_line(tmp_path, content, named):
