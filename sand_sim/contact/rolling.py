@@ -12,7 +12,7 @@ from sand_sim.contact.law import NONE, VECTOR, Law, PairNumbers
 from sand_sim.contact.tangential import TANGENTIAL_LAWS, build_bounded, build_turned
 from sand_sim.precision import Precision
 
-_ROLLING_DAMPING = 0.3  # share of critical in the spring-dashpot law
+ROLLING_DAMPING = 0.3  # share of critical in the spring-dashpot law
 
 
 def build_constant(precision: Precision, types: ContactTypes) -> wp.Function:
@@ -46,7 +46,7 @@ def build_spring(precision: Precision, types: ContactTypes) -> wp.Function:
 
     Source: model C of Ai et al. 2011, https://doi.org/10.1016/j.powtec.2010.09.030, after Iwashita & Oda 1998.
     """
-    real, vec3, damping = precision.real, precision.vec3, _ROLLING_DAMPING
+    real, vec3, damping = precision.real, precision.vec3, ROLLING_DAMPING
     bounded, turned = build_bounded(precision), build_turned(precision)
 
     @wp.func

@@ -30,6 +30,7 @@ from sand_sim.contact.damping import damping_ratio
 from sand_sim.contact.law import PairNumbers
 from sand_sim.contact.model import ContactModel
 from sand_sim.integrator import VERLET
+from sand_sim.scene.modulus_springs import friction_spring, rolling_spring
 from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.types import SMOOTH, Scene
 
@@ -70,8 +71,12 @@ def spring_and_dashpot(model: ContactModel, pair: PairNumbers, radius: float, ma
     else:
         exponent = 1.0 if model.normal == "linear" else 1.5
         damping = 2.0 * damping_ratio(given["restitution"], exponent) * math.sqrt(stiffness * mass)
+    if model.normal == "linear":
+        across, drag = friction_spring(model, pair, radius, mass, overlap)
+        stiffness, damping = max(stiffness, across), max(damping, drag)
     if model.tangential == "linear":
         stiffness = max(stiffness, given["shear_stiffness"])
+        damping = max(damping, 2.0 * damping_ratio(given["restitution"], 1.0) * math.sqrt(given["shear_stiffness"] * mass))
     if model.tangential == "viscous":
         damping = max(damping, given["shear_viscosity"])
     return stiffness, damping
@@ -129,5 +134,7 @@ def network_steps(scene: Scene, smallest: dict[str, float], spacings: Sequence[f
             meetings.append((material, radius * particle / (radius + particle), mass, surface_share(rotation, touched)))
         for other, effective_radius, reduced_mass, share in meetings:
             pair = pair_numbers(scene, grain, other)
-            stiffness, damping = spring_and_dashpot(scene.contact, pair, effective_radius, reduced_mass, overlap)
-            yield stable_step(share * stiffness / mass, share * damping / mass, scene.solver.integrator)
+            for spring in (spring_and_dashpot, rolling_spring):
+                stiffness, damping = spring(scene.contact, pair, effective_radius, reduced_mass, overlap)
+                if stiffness > 0.0:
+                    yield stable_step(share * stiffness / mass, share * damping / mass, scene.solver.integrator)

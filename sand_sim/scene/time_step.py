@@ -7,6 +7,7 @@ import numpy as np
 
 from sand_sim.contact.law import PairNumbers
 from sand_sim.contact.model import ContactModel
+from sand_sim.scene.modulus_springs import friction_spring, rolling_spring
 from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.stable_step import DEEP, network_steps
 from sand_sim.scene.types import Material, Scene, SceneError
@@ -45,7 +46,12 @@ def shortest_oscillation(model: ContactModel, pair: PairNumbers, radius: float, 
         shortest = min(shortest, np.pi * np.sqrt(2.0 / 7.0 * mass / numbers["shear_stiffness"]))
     if model.tangential == "viscous" and numbers["shear_viscosity"] > 0.0:
         shortest = min(shortest, np.pi * 2.0 / 7.0 * mass / numbers["shear_viscosity"])
-    if model.rolling == "spring":
+    if model.normal == "linear":
+        overlap = speed * np.sqrt(mass / numbers["stiffness"])
+        for spring in (friction_spring, rolling_spring):
+            stiffness, _ = spring(model, pair, radius, mass, overlap)
+            shortest = min(shortest, np.pi * np.sqrt(2.0 / 7.0 * mass / stiffness)) if stiffness > 0.0 else shortest
+    elif model.rolling == "spring":
         # k_r / I over k_n / m is 2.25 mu_r^2 R^2 m / (2/5 m R^2).
         shortest /= max(1.0, np.sqrt(2.25 / 0.4) * numbers["rolling_friction"])
     return float(shortest)

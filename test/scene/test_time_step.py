@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scenes import floor
 
-from sand_sim import SceneError
+from sand_sim import SceneError, World, read_scene
 from sand_sim.scene.time_step import contact_time, rayleigh_time
 from sand_sim.scene.types import Material
 
@@ -35,3 +36,84 @@ def test_frames_are_whole_numbers_of_steps(make_world):
     world = make_world([[0.0, 0.0, 0.0]], 0.005, frame_rate=50.0)
     assert world.frame_steps * world.time_step == pytest.approx(0.02, rel=1e-12)
     assert world.time_step <= world.assembly.time_step.safe
+
+
+STONE = {"density": 2500.0, "young": 1e9, "poisson": 0.25}
+SOFT = {"stiffness": 1e3, "shear_stiffness": 300.0}  # at rest a few hundred times softer than the springs of such a stone
+
+
+def tilted(degrees):
+    """Gravity over a floor that slopes by so much."""
+    return (9.81 * np.array([np.sin(np.radians(degrees)), 0.0, -np.cos(np.radians(degrees))])).tolist()
+
+
+def crept(world, settle, time):
+    """How far the first grain moves within a time [s], once it has settled [m]."""
+    world.step(round(settle / world.time_step))
+    before = world.observe().grains.position[0]
+    world.step(round(time / world.time_step))
+    observation = world.observe()
+    assert observation.health.doubts == ()
+    return np.abs(observation.grains.position[0] - before).max()
+
+
+@pytest.mark.parametrize("tangential", ["mindlin", "mindlin_rescaled"])
+def test_friction_of_stone_holds_on_soft_normal_springs(tmp_path, tangential):
+    """Three feet on a slope of 22 degrees with mu = 0.5."""
+    turns = 2.0 / 3.0 * np.pi * np.arange(3)
+    feet = np.column_stack([0.008 * np.cos(turns), 0.008 * np.sin(turns), np.zeros(3), np.full(3, 0.005)])
+    scene = {
+        "gravity": tilted(22.0),
+        "materials": {"stone": STONE},
+        "pairs": [{"between": ["stone", "stone"], "restitution": 0.3, "friction": 0.5} | SOFT],
+        "contact": {"normal": "linear", "tangential": tangential},
+        "bodies": {"stool": {"material": "stone", "spheres": feet.tolist(), "pose": {"position": [0.0, 0.0, 0.005]}}},
+        "boundaries": [{"type": "plane", "material": "stone", "point": [0, 0, 0], "normal": [0, 0, 1]}],
+        "domain": {"low": [-0.1] * 3, "high": [0.1] * 3},
+        "solver": {"precision": "double", "threads": 1},
+    }
+    assert crept(World(read_scene(scene, tmp_path)), 0.3, 0.2) < 1e-6 * 0.005
+
+
+@pytest.mark.parametrize("tangential", ["linear", "mindlin"])
+def test_rolling_spring_of_stone_holds_on_soft_normal_springs(make_world, tangential):
+    """A sphere with mu_r = 0.5 on a slope whose tangent is 0.4."""
+    world = make_world(
+        [0.0, 0.0, 0.005],
+        0.005,
+        material=STONE,
+        friction=0.8,
+        numbers=SOFT | {"rolling_friction": 0.5},
+        contact={"normal": "linear", "tangential": tangential, "rolling": "spring"},
+        gravity=tilted(np.degrees(np.arctan(0.4))),
+        boundaries=floor(),
+        domain={"low": [-0.1] * 3, "high": [0.1] * 3},
+        threads=1,
+    )
+    assert crept(world, 0.4, 0.2) < 1e-6 * 0.005
+
+
+@pytest.mark.parametrize("rolling_friction", [0.5, 2.0])
+def test_rolling_springs_do_not_rattle_in_a_corner(make_world, rolling_friction):
+    """A grain pressed 3 % of its radius into three walls comes to rest, however stiff the rolling spring beside Hertz's."""
+    world = make_world(
+        [0.00485, 0.00485, 0.00485],
+        0.005,
+        spin=[1.0, -2.0, 0.5],
+        friction=0.8,
+        numbers={"rolling_friction": rolling_friction},
+        contact={"rolling": "spring"},
+        gravity=[-2000.0] * 3,
+        boundaries=[{"type": "box", "name": "box", "material": "wall", "low": [0, 0, 0], "high": [0.1] * 3, "open": ["top"]}],
+        domain={"low": [-0.2] * 3, "high": [0.2] * 3},
+        threads=1,
+    )
+    world.step(round(0.1 / world.time_step))
+    assert world.observe().health.fastest < 1e-9
+
+
+def test_softer_springs_leave_the_step_of_hertz_contacts(make_world):
+    plain = make_world([0.0, 0.0, 0.005], 0.005, boundaries=floor())
+    springs = {"contact": {"rolling": "spring", "twisting": "marshall"}, "numbers": {"rolling_friction": 0.3}}
+    further = make_world([0.0, 0.0, 0.005], 0.005, boundaries=floor(), **springs)
+    assert further.assembly.time_step.safe == plain.assembly.time_step.safe
