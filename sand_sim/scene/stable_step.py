@@ -30,8 +30,8 @@ from sand_sim.contact.damping import damping_ratio
 from sand_sim.contact.law import PairNumbers
 from sand_sim.contact.model import ContactModel
 from sand_sim.integrator import VERLET
-from sand_sim.scene.modulus_springs import friction_spring, rolling_spring
 from sand_sim.scene.pairing import pair_numbers
+from sand_sim.scene.side_springs import friction_spring, rolling_spring
 from sand_sim.scene.types import SMOOTH, Scene
 
 DEEP = 0.1  # overlap over radius up to which a step shall be stable; deeper ones are reported as not to be trusted
@@ -71,14 +71,34 @@ def spring_and_dashpot(model: ContactModel, pair: PairNumbers, radius: float, ma
     else:
         exponent = 1.0 if model.normal == "linear" else 1.5
         damping = 2.0 * damping_ratio(given["restitution"], exponent) * math.sqrt(stiffness * mass)
-    if model.normal == "linear":
-        across, drag = friction_spring(model, pair, radius, mass, overlap)
-        stiffness, damping = max(stiffness, across), max(damping, drag)
-    if model.tangential == "linear":
-        stiffness = max(stiffness, given["shear_stiffness"])
-        damping = max(damping, 2.0 * damping_ratio(given["restitution"], 1.0) * math.sqrt(given["shear_stiffness"] * mass))
+    across, drag = friction_spring(model, pair, radius, mass, overlap)
+    stiffness, damping = max(stiffness, across), max(damping, drag)
     if model.tangential == "viscous":
         damping = max(damping, given["shear_viscosity"])
+    return stiffness, damping
+
+
+def turning_spring(
+    model: ContactModel, pair: PairNumbers, radius: float, mass: float, overlap: float, grain: float, fixed: bool
+) -> tuple[float, float]:
+    """Stiffness [N/m] and damping [N s/m] against turning a grain, as at its rim; zero without a rolling spring.
+
+    Friction resists that two grains turn the same way, a rolling spring that they turn opposite ways, so that either is felt in
+    full by a motion that the other does not hinder. On an immovable surface a grain feels both at once.
+
+    Args:
+        model: laws.
+        pair: of the two materials.
+        radius: effective [m].
+        mass: effective [kg].
+        overlap: at which the stiffness is taken [m].
+        grain: radius of the grain [m].
+        fixed: whether the other body is an immovable surface.
+    """
+    stiffness, damping = rolling_spring(model, pair, radius, mass, overlap, arm=radius / grain)
+    if stiffness > 0.0 and fixed:
+        across, drag = friction_spring(model, pair, radius, mass, overlap)
+        return stiffness + across, damping + drag
     return stiffness, damping
 
 
@@ -134,7 +154,8 @@ def network_steps(scene: Scene, smallest: dict[str, float], spacings: Sequence[f
             meetings.append((material, radius * particle / (radius + particle), mass, surface_share(rotation, touched)))
         for other, effective_radius, reduced_mass, share in meetings:
             pair = pair_numbers(scene, grain, other)
-            for spring in (spring_and_dashpot, rolling_spring):
-                stiffness, damping = spring(scene.contact, pair, effective_radius, reduced_mass, overlap)
+            contact = scene.contact, pair, effective_radius, reduced_mass, overlap
+            turning = turning_spring(*contact, radius, fixed=reduced_mass == mass)
+            for stiffness, damping in (spring_and_dashpot(*contact), turning):
                 if stiffness > 0.0:
                     yield stable_step(share * stiffness / mass, share * damping / mass, scene.solver.integrator)

@@ -7,8 +7,8 @@ import numpy as np
 
 from sand_sim.contact.law import PairNumbers
 from sand_sim.contact.model import ContactModel
-from sand_sim.scene.modulus_springs import friction_spring, rolling_spring
 from sand_sim.scene.pairing import pair_numbers
+from sand_sim.scene.side_springs import friction_spring, rolling_spring
 from sand_sim.scene.stable_step import DEEP, network_steps
 from sand_sim.scene.types import Material, Scene, SceneError
 
