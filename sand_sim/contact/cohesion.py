@@ -1,7 +1,7 @@
 """Cohesion laws: ``(contact, pair, memory) -> (attraction [N], memory)``, also across a gap while the memory says so.
 
 The attraction is taken off the force of the normal law; friction is bounded by the force of the normal law alone, which includes
-what balances the attraction. ``reach`` gives the widest gap across which a law acts.
+what balances the attraction. ``reach`` gives the widest gap across which a law acts, ``bond`` what it takes to part grains.
 """
 
 from collections.abc import Callable
@@ -27,9 +27,12 @@ class CohesionLaw(Law):
 
     Attributes:
         reach: ``reach(pair, smaller radius, effective radius)`` gives the widest gap [m].
+        bond: ``bond(pair, smaller radius, effective radius)`` gives the energy that a bounce loses [J] and the largest pull [N];
+            zero where what touching gives parting takes.
     """
 
     reach: Callable[[PairNumbers, float, float], float] = lambda pair, least, radius: 0.0
+    bond: Callable[[PairNumbers, float, float], tuple[float, float]] = lambda pair, least, radius: (0.0, 0.0)
 
 
 def bridge_share(saturation: float) -> float:
@@ -111,6 +114,17 @@ def capillary_reach(pair: PairNumbers, least: float, radius: float) -> float:
     """Rupture distance of the bridge of two grains [m]."""
     fields = prepare_capillary(pair)
     return float((fields["rupture_cube"] * fields["bridge_volume"]) ** (1.0 / 3.0) * least)
+
+
+def capillary_bond(pair: PairNumbers, least: float, radius: float) -> tuple[float, float]:
+    """Energy to draw a bridge from touch until it breaks [J] and its pull at touch [N]."""
+    fields = prepare_capillary(pair)
+    pull = fields["bridge_pull"] * 2.0 * radius
+    scale = np.sqrt(fields["bridge_volume"] * least**3 / (2.0 * radius))
+    wide = capillary_reach(pair, least, radius) / scale
+    root = np.sqrt(4.0 * 2.5 - 1.05**2)
+    area = 2.0 / root * (np.arctan((5.0 * wide + 1.05) / root) - np.arctan(1.05 / root))
+    return float(pull * scale * area), float(pull)
 
 
 def build_dmt(precision: Precision, types: ContactTypes) -> wp.Function:
@@ -261,6 +275,15 @@ def jkr_reach(pair: PairNumbers, least: float, radius: float) -> float:
     return 3.0 * patch**2 / radius
 
 
+def jkr_bond(pair: PairNumbers, least: float, radius: float) -> tuple[float, float]:
+    """Energy that a bounce loses, ``7.09 (w^5 R*^4 / E*^2)^(1/3)`` [J], and the pull-off force, ``3/2 pi w R*`` [N].
+
+    Source: Thornton & Ning 1998, https://doi.org/10.1016/S0032-5910(98)00099-0.
+    """
+    adhesion = pair.given["adhesion"]
+    return 7.09 * (adhesion**5 * radius**4 / pair.young**2) ** (1.0 / 3.0), 1.5 * np.pi * adhesion * radius
+
+
 COHESION_LAWS = {
     "none": CohesionLaw(build=lambda precision, types: None),
     "capillary": CohesionLaw(
@@ -274,6 +297,7 @@ COHESION_LAWS = {
         prepare=prepare_capillary,
         memory=(1,),
         reach=capillary_reach,
+        bond=capillary_bond,
     ),
     "dmt": CohesionLaw(
         build_dmt,
@@ -291,5 +315,6 @@ COHESION_LAWS = {
         asks=("adhesion",),
         memory=(1,),
         reach=jkr_reach,
+        bond=jkr_bond,
     ),
 }
