@@ -31,21 +31,30 @@ def check_file(path: Path) -> None:
 
 
 def is_text_stl(data: bytes) -> bool:
-    """Whether an STL file is text; binary files may begin with ``solid`` too."""
-    return data.lstrip()[:5].lower() == b"solid" and (b"facet" in data[:2000] or b"endsolid" in data[:2000])
+    """Whether an STL file is text; binary files may begin with ``solid`` too, but hold the triangles they promise."""
+    promised, held = _stl_triangles(data)
+    begins = data.lstrip(b"\xef\xbb\xbf \t\r\n")[:5].lower() == b"solid"
+    return begins and promised > held and re.search(rb"facet|endsolid", data, re.IGNORECASE) is not None
+
+
+def _stl_triangles(data: bytes) -> tuple[int, int]:
+    """How many triangles a binary STL file promises, and how many it holds."""
+    return int.from_bytes(data[80:_STL_HEADER], "little"), (len(data) - _STL_HEADER) // _STL_TRIANGLE
 
 
 def _check_stl(name: str, data: bytes) -> None:
     if is_text_stl(data):
-        if b"endsolid" not in data[-2000:]:
+        text = data.lower()
+        if text.rfind(b"endsolid") <= text.rfind(b"endfacet"):
             raise MeshError(f"mesh {name}: is cut off: it does not end with 'endsolid'; copy or export it again")
-        if data.count(b"vertex") % 3 or data.count(b"endfacet") * 3 != data.count(b"vertex"):
+        if text.count(b"vertex") % 3 or text.count(b"endfacet") * 3 != text.count(b"vertex"):
             raise MeshError(f"mesh {name}: is damaged: its facets do not have three vertices each; export it again")
         return
+    if not re.search(rb"[\0-\x08\x0e-\x1f]", data[:500]):
+        raise MeshError(f"mesh {name}: is no STL file but other text: '{data.split()[0][:20].decode(errors='replace')} ...'")
     if len(data) < _STL_HEADER:
         raise MeshError(f"mesh {name}: is cut off: {len(data)} bytes are too few for an STL file")
-    (promised,) = struct.unpack_from("<I", data, 80)
-    held = (len(data) - _STL_HEADER) // _STL_TRIANGLE
+    promised, held = _stl_triangles(data)
     if promised > held:
         raise MeshError(f"mesh {name}: is cut off: it promises {promised} triangles and holds {held}; copy or export it again")
     if promised == 0:

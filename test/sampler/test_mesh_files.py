@@ -96,6 +96,29 @@ def stl_of(triangles):
     return b"\0" * 80 + struct.pack("<I", len(triangles)) + rows
 
 
+@pytest.mark.parametrize("write", [str.upper, lambda text: text.replace("solid ", "solid " + 3000 * "x", 1)])
+def test_text_stl_is_told_however_it_begins(tmp_path, box, write):
+    text = box.export(file_type="stl_ascii")
+    assert "solid " in text
+    (tmp_path / "text.stl").write_text(write(text))
+    assert read_mesh(tmp_path / "text.stl").volume == pytest.approx(box.volume, rel=1e-6)
+    (tmp_path / "cut.stl").write_text(write(text)[: -len(text) // 2])
+    with pytest.raises(MeshError, match="does not end with 'endsolid'"):
+        read_mesh(tmp_path / "cut.stl")
+
+
+def test_binary_stl_is_told_though_its_header_says_facet(tmp_path, box):
+    (tmp_path / "binary.stl").write_bytes(b"solid of facets".ljust(80) + box.export(file_type="stl")[80:])
+    assert read_mesh(tmp_path / "binary.stl").volume == pytest.approx(box.volume, rel=1e-6)
+
+
+@pytest.mark.parametrize("text", ["<html><body>404 not found</body></html>\n", "solid advice, but no mesh\n"])
+def test_text_that_is_no_stl_is_told(tmp_path, text):
+    (tmp_path / "page.stl").write_text(10 * text)
+    with pytest.raises(MeshError, match=rf"page\.stl: is no STL file but other text: '{text[:5]}"):
+        read_mesh(tmp_path / "page.stl")
+
+
 def test_vertices_that_are_not_finite_are_refused(tmp_path, box):
     triangles = np.array(box.triangles)
     triangles[3, 1, 2] = np.nan
