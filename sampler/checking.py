@@ -5,6 +5,7 @@ import struct
 from pathlib import Path
 
 from sampler.errors import MeshError
+from sampler.obj import plain_obj
 
 _POINTER = b"version https://git-lfs"
 _STL_HEADER, _STL_TRIANGLE = 84, 50  # bytes
@@ -63,20 +64,20 @@ def _check_stl(name: str, data: bytes) -> None:
 
 def _check_obj(name: str, data: bytes) -> None:
     """Readers drop faces they do not understand; a body with faces dropped would be wrong in silence."""
-    vertices = len(re.findall(rb"^\s*v\s", data, re.MULTILINE))
-    text = re.sub(rb"\\\r?\n", b" ", data)
-    for match in re.finditer(rb"^[ \t]*f[ \t]([^\r\n]*)", text, re.MULTILINE):
-        corners = match.group(1).split(b"#")[0].split()
+    data = plain_obj(data)
+    vertices = data.count(b"\nv ")
+    for match in re.finditer(rb"\nf ([^\r\n]*)", data):
+        corners = match.group(1).split()
         try:
             indices = [int(corner.split(b"/")[0]) for corner in corners]
         except ValueError:
-            indices = []
-        if len(indices) < 3 or any(i == 0 or abs(i) > vertices for i in indices):
+            indices = [0] * len(corners)
+        if len(indices) < 3 or min(indices) < 1 or max(indices) > vertices:
             shown = match.group(0).decode(errors="replace").strip()
             reason = "has too few corners" if len(indices) < 3 else f"refers to a vertex that is not among the {vertices}"
             raise MeshError(f"mesh {name}: is corrupt: the face '{shown}' {reason}; export it again")
-    lines = data.rsplit(b"\n", 1)[-1].split()
-    if lines and lines[0] == b"v" and len(lines) < 4:
+    last = data.rstrip().rsplit(b"\n", 1)[-1].split()
+    if last and last[0] == b"v" and len(last) < 4:
         raise MeshError(f"mesh {name}: is cut off in the middle of its last vertex; copy or export it again")
 
 

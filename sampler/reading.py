@@ -9,6 +9,7 @@ import trimesh
 
 from sampler.checking import check_file, is_text_stl
 from sampler.errors import MeshError
+from sampler.obj import plain_obj
 from sampler.strips import read_strips
 
 
@@ -38,7 +39,7 @@ def read_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
         raise MeshError(f"mesh {path.name}: is damaged, or a kind of {path.suffix} that needs the module {error.name}") from None
     except Exception as error:  # trimesh raises whatever its many parsers raise
         raise MeshError(f"mesh {path.name}: cannot be read as {path.suffix or 'a mesh'}: {error}") from None
-    mesh.apply_scale(scale)
+    mesh.vertices = mesh.vertices * scale
     return check_mesh(mesh, path.name)
 
 
@@ -51,6 +52,8 @@ def check_mesh(mesh: trimesh.Trimesh, name: str = "mesh") -> trimesh.Trimesh:
     vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces)
     if not len(faces):
         raise MeshError(f"mesh {name}: has no triangles")
+    if vertices.shape[1:] != (3,):
+        raise MeshError(f"mesh {name}: has a vertex with fewer than three coordinates; export it again")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise MeshError(f"mesh {name}: a face refers to vertex {faces.max()} of {len(vertices)}; the file is corrupt")
     if not np.all(np.isfinite(vertices[faces])):
@@ -64,10 +67,7 @@ def _load(path: Path) -> trimesh.Trimesh:
     """Everything that trimesh finds in a file, in one mesh, in metres where the file says what its unit is."""
     if path.suffix.lower() == ".stl" and not is_text_stl(data := path.read_bytes()):
         return _read_stl(data)
-    dae = path.suffix.lower() == ".dae"
-    scene = (
-        trimesh.load_scene(_plain_dae(path), file_type="dae", process=False) if dae else trimesh.load_scene(path, process=False)
-    )
+    scene = _load_scene(path)
     shapes = list(scene.geometry.values())
     if shapes and not any(isinstance(shape, trimesh.Trimesh) for shape in shapes):
         raise MeshError(f"mesh {path.name}: holds points or lines only, no triangles")
@@ -81,6 +81,16 @@ def _load(path: Path) -> trimesh.Trimesh:
     if path.suffix.lower() in (".dae", ".zae") and unit:
         mesh.apply_scale(float(unit.group(1)))
     return mesh
+
+
+def _load_scene(path: Path) -> trimesh.Scene:
+    """What trimesh finds in a file, which is made plain for it where it would leave something out."""
+    kind = path.suffix[1:].lower()
+    if kind == "obj":
+        return trimesh.load_scene(io.BytesIO(plain_obj(path.read_bytes())), file_type=kind, process=False)
+    if kind == "dae":
+        return trimesh.load_scene(_plain_dae(path), file_type=kind, process=False)
+    return trimesh.load_scene(path, process=False)
 
 
 def _plain_dae(path: Path) -> io.BytesIO:
