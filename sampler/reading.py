@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 
 from sampler.checking import check_file, is_text_stl
+from sampler.dae import plain_dae
 from sampler.errors import MeshError
 from sampler.obj import plain_obj
 from sampler.strips import read_strips
@@ -89,14 +90,9 @@ def _load_scene(path: Path) -> trimesh.Scene:
     if kind == "obj":
         return trimesh.load_scene(io.BytesIO(plain_obj(path.read_bytes())), file_type=kind, process=False)
     if kind == "dae":
-        return trimesh.load_scene(_plain_dae(path), file_type=kind, process=False)
+        data = plain_dae(path.name, path.read_bytes())
+        return trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False, ignore_broken=False)
     return trimesh.load_scene(path, process=False)
-
-
-def _plain_dae(path: Path) -> io.BytesIO:
-    """A DAE file without its materials: where one is missing, readers leave out the triangles that wear it."""
-    materials = rb"<(bind_material|library_(?:effects|materials|images))\b[^>]*?(?:/>|>.*?</\1>)"
-    return io.BytesIO(re.sub(materials, b"", path.read_bytes(), flags=re.DOTALL))
 
 
 def _read_stl(data: bytes) -> trimesh.Trimesh:

@@ -1,4 +1,4 @@
-"""OBJ files of cubes, written in every way."""
+"""OBJ and DAE files of cubes: written in every way, and with what readers would leave out or take for something else."""
 
 import re
 
@@ -69,3 +69,81 @@ def test_a_face_of_obj_that_is_not_of_numbers_is_refused(tmp_path):
     (tmp_path / "float.obj").write_text(obj_cube().replace("f 1 2", "f 1.0 2"))
     with pytest.raises(MeshError, match=r"'f 1\.0 2 4 3' refers to a vertex that is not among the 8"):
         read_mesh(tmp_path / "float.obj")
+
+
+def dae_cube(name):
+    positions = " ".join(f"{x} {y} {z}" for x, y, z in CORNERS)
+    indices = " ".join(f"{corner - 1} 0 0" for square in SQUARES for corner in square)
+    named = "<technique_common><accessor source='#{0}' count='{1}' stride='3'>{2}</accessor></technique_common>"
+    axes = "".join(f"<param name='{axis}' type='float'/>" for axis in "XYZ")
+    return (
+        f"<geometry id='{name}'><mesh>"
+        f"<source id='{name}-p'><float_array id='{name}-pa' count='24'>{positions}</float_array>"
+        f"{named.format(name + '-pa', 8, axes)}</source>"
+        f"<source id='{name}-n'><float_array id='{name}-na' count='3'>0 0 1</float_array>"
+        f"{named.format(name + '-na', 1, axes)}</source>"
+        f"<vertices id='{name}-v'><input semantic='POSITION' source='#{name}-p'/></vertices>"
+        f"<polylist count='6'><input semantic='VERTEX' source='#{name}-v' offset='0'/>"
+        f"<input semantic='NORMAL' source='#{name}-n' offset='2'/><input semantic='COLOR' source='#{name}-n' offset='1'/>"
+        f"<vcount>4 4 4 4 4 4</vcount><p>{indices}</p></polylist>"
+        "</mesh></geometry>"
+    )
+
+
+def dae_cubes():
+    """Two cubes with edges of 0.5 m, 2 m apart."""
+    nodes = "".join(f"<node><translate>{4 * k} 0 0</translate><instance_geometry url='#g{k}'/></node>" for k in range(2))
+    return (
+        '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset><unit meter="0.5"/></asset>'
+        f"<library_geometries>{dae_cube('g0')}{dae_cube('g1')}</library_geometries>"
+        f"<library_visual_scenes><visual_scene id='s'>{nodes}</visual_scene></library_visual_scenes>"
+        "<scene><instance_visual_scene url='#s'/></scene></COLLADA>"
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("", ""),
+        ("0 0 1</float_array>", "NaN 0 1</float_array>"),
+        ("<p>0 0", "<p>0 7"),
+        ("<p>0 0", "<p>0 -1"),
+        ("'NORMAL'", "'SMELL'"),
+        ("</polylist>", "</polylist><linestrips count='1'><p>0 7</p></linestrips>"),
+        ("<node>", "<node><instance_light url='#lost'/><!-- dark -->"),
+    ],
+    ids=["sound", "normal", "index-of-normal", "no-normal", "input", "lines", "light"],
+)
+def test_dae_is_read_whatever_else_is_broken(tmp_path, old, new):
+    (tmp_path / "cubes.dae").write_text(dae_cubes().replace(old, new))
+    mesh = read_mesh(tmp_path / "cubes.dae")
+    assert mesh.volume == pytest.approx(2 * 0.125)
+    assert mesh.bounds == pytest.approx(np.array([[0, 0, 0], [2.5, 0.5, 0.5]]))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("0 1 1 1</float_array>", "0 1 NaN 1</float_array>", "has vertices that are not finite"),
+        ("0 1 1 1</float_array>", "0 1 INF 1</float_array>", "has vertices that are not finite"),
+        ("0 1 1 1</float_array>", "0 1 1e400 1</float_array>", "has vertices that are not finite"),
+        ("0 1 1 1</float_array>", "0 1 -1.#IND 1</float_array>", "'-1.#IND' in its coordinates"),
+        ("0 1 1 1</float_array>", "0</float_array>", "promises 24 coordinates and holds 21"),
+        ("<p>0 0", "<p>30 0", "maxindex=30"),
+        ("<p>0 0", "<p>-8 0", "a vertex numbered below zero"),
+        ("url='#g1'", "url='#lost'", "Geometry #lost not found"),
+        ("source='#g1-p'", "source='#lost'", "names the coordinates 'lost' and does not hold them"),
+        ("<instance_geometry url='#g1'/>", "<instance_controller url='#bones'/>", "has <instance_controller>"),
+        ("<translate>4 0 0</translate>", "<skew>45 0 1 0 1 0 0</skew>", "has <skew>"),
+        ("<instance_visual_scene url='#s'/>", "", "names no scene"),
+        ('"0.5"', '"0,5"', "its unit is '0,5' metres, which is no number"),
+        ("COLLADA", "html", "is no DAE file"),
+    ],
+)
+def test_dae_of_which_a_part_would_be_lost_is_refused(tmp_path, old, new, reason):
+    text = dae_cubes()
+    assert old in text
+    head, tail = text.rsplit(old, 1)  # where both cubes have it, only the second one is broken
+    (tmp_path / "broken.dae").write_text(text.replace(old, new) if old == "COLLADA" else head + new + tail)
+    with pytest.raises(MeshError, match=r"mesh broken\.dae: .*" + re.escape(reason)):
+        read_mesh(tmp_path / "broken.dae")
