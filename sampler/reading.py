@@ -37,7 +37,7 @@ def read_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
     except MeshError:
         raise
     except ModuleNotFoundError as error:
-        raise MeshError(f"mesh {path.name}: is damaged, or a kind of {path.suffix} that needs the module {error.name}") from None
+        raise MeshError(f"mesh {path.name}: is damaged, or needs what is not installed: {error}") from None
     except Exception as error:  # trimesh raises whatever its many parsers raise
         raise MeshError(f"mesh {path.name}: cannot be read as {path.suffix or 'a mesh'}: {error}") from None
     mesh.vertices = mesh.vertices * scale

@@ -153,3 +153,13 @@ def test_triangle_soup_has_no_inside():
 def test_bad_robot_meshes_are_refused(name, reason):
     with pytest.raises(MeshError, match=reason):
         sample_body(read_mesh(robot_mesh(name)), radius=0.01)
+
+
+@pytest.mark.parametrize(("kind", "module"), [("3mf", "networkx"), ("step", "cascadio")])
+def test_the_module_that_a_kind_of_file_needs_is_named(tmp_path, kind, module):
+    (tmp_path / f"part.{kind}").write_bytes(b"PK")
+    code = "import sys; sys.modules[sys.argv[2]] = None; from sampler import read_mesh; read_mesh(sys.argv[1])"
+    command = [sys.executable, "-c", code, str(tmp_path / f"part.{kind}"), module]
+    last = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False).stderr.splitlines()[-1]
+    assert "needs what is not installed: " in last
+    assert module in last
