@@ -53,7 +53,9 @@ class FrameTree:
             frame, seen = self._frames.get(name), seen + 1
             if frame is None or seen > len(self._frames):
                 known = ", ".join(sorted([self.root, *self._frames])[:20])
-                raise CommandError("unknown_frame", f"frame '{start}' does not hang on '{self.root}'; known are {known}")
+                bare = start.lstrip("/") or self.root
+                hint = f"; say '{bare}'" if bare != start and bare in (self.root, *self._frames) else ""
+                raise CommandError("unknown_frame", f"frame '{start}' does not hang on '{self.root}'{hint}; known are {known}")
             yield frame
             name = frame.parent
 

@@ -75,3 +75,10 @@ def test_length_of_a_quaternion_does_not_matter():
     for size in (1e-3, 1.0, 1e200):
         tree.put(Frame("a", "world", np.zeros(3), size * turned))
         assert tree.in_root("a", np.array([1.0, 0.0, 0.0]), NO_TURN)[0] == pytest.approx([0.0, 1.0, 0.0])
+
+
+def test_names_that_miss_little_are_told_what_to_say():
+    tree = FrameTree("world")
+    for name in ("", "/world"):
+        with pytest.raises(CommandError, match=f"frame '{name}' does not hang on 'world'; say 'world'"):
+            tree.in_root(name, np.zeros(3), NO_TURN)

@@ -132,7 +132,7 @@ class Parameters(Mapping):
                 raise ValueError(f"parameter {declaration.name}: must be a {kind}{hint}; {error}") from None
             self._declarations[declaration.name] = declaration
             self._values[declaration.name] = self._node.get_parameter(declaration.name).value
-            if refusal := _refusal(declaration, self._values[declaration.name]):
+            if refusal := _refusal(declaration, self._values[declaration.name]) or self._clash(declaration.name):
                 raise ValueError(f"parameter {declaration.name}: {refusal}")
 
     def __getitem__(self, name: str) -> Any:
@@ -143,6 +143,12 @@ class Parameters(Mapping):
 
     def __len__(self) -> int:
         return len(self._values)
+
+    def _clash(self, name: str) -> str:
+        """Why a value does not fit to the others, empty if it does."""
+        if name.endswith(".frame") and self._values[name] == self._values["frame_id"]:
+            return f"'{self._values[name]}' is the world frame; give the tool a frame of its own"
+        return ""
 
     def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:
@@ -176,6 +182,8 @@ def _refusal(declaration: Declaration, value: Any) -> str:
             return "each of the first three numbers must be less than its partner among the last three"
     elif isinstance(value, float) and not np.isfinite(value):
         return "must be finite"
+    if (declaration.name == "frame_id" or declaration.name.endswith(".frame")) and (not value or value.startswith("/")):
+        return f"must name a frame, without a '/' before it, not '{value}'"
     if declaration.choices and isinstance(value, list) and (not value or len(set(value)) != len(value)):
         return "must name something, and nothing twice"
     return ""

@@ -28,7 +28,7 @@ class Noted:
 def launch_file(monkeypatch):
     for module, names in {
         "launch": ["LaunchDescription"],
-        "launch.actions": ["DeclareLaunchArgument"],
+        "launch.actions": ["DeclareLaunchArgument", "OpaqueFunction"],
         "launch.conditions": ["IfCondition"],
         "launch.substitutions": ["LaunchConfiguration"],
         "launch_ros": [],
@@ -46,19 +46,32 @@ def launch_file(monkeypatch):
     return module
 
 
-def test_launch_arguments_are_parameters_of_the_node(launch_file):
-    assert set(launch_file.PARAMETERS) <= NAMES
+def started(launch_file, **given):
+    """The node that is started with some arguments, and what is declared."""
     (entries,) = launch_file.generate_launch_description().arguments
     declared = {entry.arguments[0]: entry.named for entry in entries if type(entry).__name__ == "DeclareLaunchArgument"}
+    values = {name: entry["default_value"] for name, entry in declared.items()} | given
+    (opaque,) = (entry for entry in entries if type(entry).__name__ == "OpaqueFunction")
+    launch_file.LaunchConfiguration.perform = lambda self, context: context[self.arguments[0]]
+    (node,) = opaque.named["function"](values)
+    return node, declared
+
+
+def test_launch_arguments_are_parameters_of_the_node(launch_file):
+    node, declared = started(launch_file, **dict.fromkeys(launch_file.PARAMETERS, "1"))
     assert all(entry["description"] for entry in declared.values())
-    (node,) = (entry for entry in entries if type(entry).__name__ == "LifecycleNode")
-    assert set(node.named["parameters"][1]) == set(launch_file.PARAMETERS)
+    assert set(node.named["parameters"][1]) == set(launch_file.PARAMETERS) <= NAMES
     assert float(node.named["sigterm_timeout"]) >= 30.0, "a second signal would end it before it has written its files"
     assert Path(declared["params_file"]["default_value"]).is_file()
     defaults = {declaration.name: declaration.default for declaration in DECLARATIONS}
-    for name, (default, _, kind) in launch_file.PARAMETERS.items():
-        assert yaml.safe_load(default or "''") == defaults[name]
+    for name, (text, kind) in launch_file.PARAMETERS.items():
         assert isinstance(defaults[name], kind)
+        assert str(defaults[name]).lower() in text.lower() or name == "autostart"
+
+
+def test_arguments_that_are_not_given_leave_the_parameter_file_alone(launch_file):
+    node, _ = started(launch_file, scene="hopper")
+    assert {name: value.arguments for name, value in node.named["parameters"][1].items()} == {"scene": ("hopper",)}
 
 
 def test_parameter_file_names_parameters_with_their_defaults():

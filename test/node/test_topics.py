@@ -142,6 +142,9 @@ def test_poses_in_fixed_frames(client, start_node):
         ({"frame_names": ["base"], "frames.base.parent": "moon"}, "frames.base.parent: frame 'base' does not hang on 'world'"),
         ({"frame_names": ["world"]}, "frames.world: frame 'world' in 'world': needs two different names"),
         ({"frame_names": ["base"], "frames.base.pose": [1.0]}, "frames.base.pose: must be 6 finite numbers"),
+        ({"frame_id": "/map"}, "frame_id: must name a frame, without a '/' before it, not '/map'"),
+        ({"tools.plate.frame": ""}, "tools.plate.frame: must name a frame"),
+        ({"tools.plate.frame": "world"}, "tools.plate.frame: 'world' is the world frame; give the tool a frame of its own"),
         ({"tools.plate.source": "telepathy"}, "tools.plate.source: unknown 'telepathy'; known are pose, twist, tf"),
     ],
 )
