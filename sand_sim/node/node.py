@@ -194,6 +194,8 @@ class SandSimNode(LifecycleNode):
             self.simulation.resume()
         if world.assembly.time_step.warning:
             self.get_logger().warning(world.assembly.time_step.warning)
+        for name, similar in parameters.misspelt().items():
+            self.get_logger().warning(f"there is no parameter '{name}'" + (f"; is '{similar}' meant?" if similar else ""))
         self._warn_of_coarse_points(world)
         self.configured = True
         self.hold(parameters["paused"])

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from rclpy.parameter import Parameter
 from msg_adapters.sensor_msgs import POINT_FIELDS, USUAL_FIELDS
 from sand_sim.simulation import PACINGS
 
+_OF_ROS = ("use_sim_time", "start_type_description_service")
 SOURCES = ("pose", "twist", "tf")
 WRENCH_FRAMES = ("tool", "world")
 
@@ -134,6 +136,13 @@ class Parameters(Mapping):
             self._values[declaration.name] = self._node.get_parameter(declaration.name).value
             if refusal := _refusal(declaration, self._values[declaration.name]) or self._clash(declaration.name):
                 raise ValueError(f"parameter {declaration.name}: {refusal}")
+
+    def misspelt(self) -> dict[str, str]:
+        """Parameters that were given but that nobody has declared, and the most similar of those declared, or ''."""
+        known = [*self._values, *_OF_ROS]
+        given = [name for name in self._node._parameter_overrides if not (name in known or self._node.has_parameter(name))]
+        strange = [name for name in given if not name.startswith("qos_overrides.")]
+        return {name: next(iter(get_close_matches(name, known, 1)), "") for name in strange}
 
     def __getitem__(self, name: str) -> Any:
         return self._values[name]

@@ -85,3 +85,8 @@ def test_quality_of_service_is_overridden_topic_by_topic(ros, start_node):
     for topic in ("/sand_sim/heights", "/clock", "/sand_sim/tools/plate/wrench"):
         (other,) = node.get_publishers_info_by_topic(topic)
         assert other.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+
+
+def test_parameters_that_nobody_declares_are_named(start_node):
+    node = start_node(pacing="lockstep", **{"scene_file": "hopper", "tools.plaet.source": "twist", "use_sim_time": False})
+    assert node.parameters.misspelt() == {"scene_file": "scene", "tools.plaet.source": "tools.plate.source"}
