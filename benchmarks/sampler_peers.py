@@ -16,8 +16,8 @@ import numpy as np
 import trimesh
 
 from sampler import MeshError, read_mesh, repair_mesh, sample_body
-from sampler.gaps import measure_evenness
 from sampler.lattice import lattice_spacing
+from sampler.measuring import measure_evenness
 from sampler.repair import SHEET
 from sampler.skin import Skin, free_triangles
 from sampler.surface import Surface

@@ -65,31 +65,32 @@ def find_gaps(
     place_normals: wp.array(dtype=wp.vec3),
     spacing: float,
     enough: float,
+    most: float,
     first: int,
     found: wp.array(dtype=Nearest),
     found_along: wp.array(dtype=Nearest),
 ):
-    """Particle nearest to each place, and the nearest one along the surface, in spacings; at most 2, the next at most 1.
+    """Particle nearest to each place, and the nearest one along the surface, in spacings; at most ``most``, the next at most 1.
 
     Where one along the surface is nearer than ``enough``, at most 1, the next is looked for as near as that only.
     """
     i = first + wp.tid()
     here = places[i]
-    closest = Nearest(int(-1), 2.0 * spacing, spacing)
-    own = Nearest(int(-1), 2.0 * spacing, spacing)
+    closest = Nearest(int(-1), most * spacing, spacing)
+    own = Nearest(int(-1), most * spacing, spacing)
     reach = enough * spacing
-    while reach < 3.0 * spacing:
-        closest = Nearest(int(-1), 2.0 * spacing, spacing)
-        own = Nearest(int(-1), 2.0 * spacing, spacing)
+    while reach < 1.5 * most * spacing:
+        closest = Nearest(int(-1), most * spacing, spacing)
+        own = Nearest(int(-1), most * spacing, spacing)
         for j in wp.hash_grid_query(grid, here, reach):
             way = wp.length(points[j] - here)
             if way < wp.max(own.way, own.next):  # the way along the surface is no shorter
                 closest = nearer(closest, j, way)
                 own = nearer(own, j, way_along(here, place_normals[i], points[j], normals[j], _NARROW * spacing))
         if own.way <= reach:
-            reach = 3.0 * spacing
+            reach = 2.0 * most * spacing
         else:  # beyond 1 next to never
-            reach = wp.where(reach < spacing, spacing, reach + spacing)
+            reach = wp.where(reach < spacing, spacing, 2.0 * reach)
     found[i] = Nearest(closest.which, closest.way / spacing, closest.next / spacing)
     found_along[i] = Nearest(own.which, own.way / spacing, own.next / spacing)
 

@@ -5,9 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from sampler.body import Evenness
 from sampler.gap_kernels import Nearest, find_gaps, find_nearest
-from sampler.lattice import lattice_spacing
 from sampler.launching import launch_shares
 from sampler.skin import Skin
 
@@ -20,7 +18,7 @@ _ROOM, _NEAR = 0.55, 0.4  # a gap is filled so far from particles of other skins
 _LEAST = 0.40  # particles nearer than this to one another are a fault, in spacings
 _LONELY, _BESIDE = 1.09, (0.6, 1.06)  # those farther than this from all others get a neighbour, how far beside them; in spacings
 _MOVED, _TURNED = 1e-3, 0.999  # what has moved less, in spacings, and turned less, by the cosine, lies where it was
-_MEASURED = 100  # places per particle at which the result is measured
+FAR = 2.0  # how far particles are looked for, in spacings; farther ones are as bad
 
 
 @dataclass(frozen=True)
@@ -116,7 +114,7 @@ class Gaps:
         nearest = self.neighbour_distances()
         for _ in range(2):
             doubtful = np.flatnonzero(self.places.excess > -_DOUBT)[: len(self.points)]
-            self.add(*self._beside(doubtful, random))
+            self.add(*self.beside(self.places.points[doubtful], self.places.normals[doubtful], _CLOSER, random))
         places, free, excess = self.places, self.places.closest["way"], self.places.excess
         for i in np.flatnonzero(nearest > _LONELY):
             away = np.linalg.norm(places.points - self.points[i], axis=1) / self.spacing
@@ -134,18 +132,24 @@ class Gaps:
         self.places = places.at(places.fixed | (excess > -_WATCHED))
         return verdict
 
-    def neighbour_distances(self) -> np.ndarray:
-        """Distance of particles from the nearest other one, at most 2; in spacings."""
+    def widen(self, most: float) -> None:
+        """Sort the particles so that they are found fast as far as ``most``, in spacings."""
+        self.grid.build(self._where, max(1.0, most / FAR) * self.spacing / self.skin.unit)
+
+    def neighbour_distances(self, most: float = FAR) -> np.ndarray:
+        """Distance of particles from the nearest other one, at most ``most``; in spacings."""
         unit = self.spacing / self.skin.unit
         nearest = wp.empty(len(self.points), dtype=float, device=self.device)
-        launch_shares(find_nearest, len(self.points), [self.grid.id, self._where, 2.0 * unit], [nearest], self.device)
+        launch_shares(find_nearest, len(self.points), [self.grid.id, self._where, most * unit], [nearest], self.device)
         return nearest.numpy() / unit
 
-    def measure(self, points: np.ndarray, normals: np.ndarray, enough: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    def measure(
+        self, points: np.ndarray, normals: np.ndarray, enough: float = 1.0, most: float = FAR
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Particles nearest to places, and along the surface, as ``find_gaps``."""
         found = tuple(wp.empty(len(points), dtype=Nearest, device=self.device) for _ in range(2))
         inputs = [self.grid.id, self._where, self._up, self.skin.shift(points), self._vectors(normals)]
-        launch_shares(find_gaps, len(points), [*inputs, self.spacing / self.skin.unit, enough], list(found), self.device)
+        launch_shares(find_gaps, len(points), [*inputs, self.spacing / self.skin.unit, enough, most], list(found), self.device)
         return tuple(values.numpy() for values in found)
 
     def _missed(self) -> np.ndarray:
@@ -182,26 +186,18 @@ class Gaps:
                     chosen[n] = near[free[near].argmax()]
         return chosen
 
-    def _beside(self, doubtful: np.ndarray, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """Places a little aside of doubtful ones."""
-        points, normals = (np.tile(x[doubtful], (len(_CLOSER), 1)) for x in (self.places.points, self.places.normals))
-        aside = np.repeat(_CLOSER, len(doubtful))[:, None] * self.spacing * random.standard_normal(points.shape)
+    def beside(
+        self, points: np.ndarray, normals: np.ndarray, steps: tuple[float, ...], random: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Places a little aside of others, one for each step, in spacings, and the normals there; all of the first step first."""
+        aside = np.repeat(steps, len(points))[:, None] * self.spacing * random.standard_normal((len(steps) * len(points), 3))
+        points, normals = (np.tile(x, (len(steps), 1)) for x in (points, normals))
         reach = 1.01 * np.linalg.norm(aside, axis=1) + 1e-4 * self.skin.unit  # the way back, if none is shorter
         points, face = self.skin.closest(points + aside, reach, up=normals)
         return points, self.skin.normals[face]
 
     def _vectors(self, values: np.ndarray) -> wp.array:
         return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
-
-
-def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Evenness:
-    """Measure particles, shape (n, 3) [m], with their normals, on the surface they lie on."""
-    gaps = Gaps(skin, lattice_spacing(float(skin.areas.sum()), len(points)))
-    gaps.look(points, normals)
-    closest, own = gaps.measure(*skin.places(_MEASURED * len(points), np.random.default_rng(1)), _GAP - _WATCHED)
-    nearest, free, own = gaps.neighbour_distances(), closest["way"], own["way"]
-    variation = nearest.std() / nearest.mean()
-    return Evenness(*map(float, (variation, nearest.min(), nearest.max(), free.max(), own.max())))
 
 
 def _excess(free: np.ndarray, own: np.ndarray) -> np.ndarray:

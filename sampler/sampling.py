@@ -8,10 +8,10 @@ import trimesh
 
 from sampler.body import ParticleBody
 from sampler.errors import MeshError
-from sampler.gaps import measure_evenness
 from sampler.inset import inset_particles
 from sampler.lattice import lattice_spacing, particle_count
 from sampler.mass import integrate, is_physical
+from sampler.measuring import measure_evenness
 from sampler.options import check_options
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
 from sampler.sheets import beyond_rims, closed_triangles, thick_plates
