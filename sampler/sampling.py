@@ -21,6 +21,8 @@ from sampler.surface import Surface
 
 SPACING = 1.5  # default distance between neighbours in particle radii; below 2 so that particles overlap into a closed skin
 MOST = 2_000_000  # particles, more are not meant
+_BURIED = 10.0  # times as large as what can be touched, at most, is all of a surface that is worth cutting
+_HUGE = 1000.0  # particles of so many diagonals are not meant
 
 _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest grain
 _COVERED = 0.80  # coverage to expect, in spacings
@@ -71,6 +73,7 @@ def sample_body(
     check_options(lengths, count, seed, device)
     repaired = mesh if isinstance(mesh, RepairedMesh) else repair_mesh(mesh, sheets)
     thickness = 2.0 * radius if thickness is None else thickness
+    _check_scale(repaired.triangles, radius, _spacing(radius, spacing, count, grain, repaired.triangles))
     closed, owner = closed_triangles(repaired, thickness)
     fine = _spacing(radius, spacing, count, grain, closed)
     around = solid = Surface(closed, device)
@@ -94,10 +97,7 @@ def sample_body(
     for attempt in range(_TRIES):
         number = count if count is not None else particle_count(area, fine)
         if number > MOST:
-            raise MeshError(
-                f"a surface of {area:.3g} m^2 would need {number:.2g} particles of radius {radius:.3g} m; "
-                "check the mesh's scale, or take larger particles"
-            )
+            raise _too_many(area, number, radius)
         h = lattice_spacing(area, number)
         settle = partial(_clear_creases, skin=skin, solid=solid, spacing=h) if solid else lambda *placed: placed
         beyond = beyond_rims(repaired.vertices, sheet, skin, h)
@@ -129,6 +129,28 @@ def sample_body(
         evenness=evenness,
         steps=dict(repaired.report.steps),
         warnings=tuple(warnings),
+    )
+
+
+def _check_scale(triangles: np.ndarray, radius: float, spacing: float) -> None:
+    """Refuse numbers that cannot be meant before anything is cut for them, which takes long or overflows."""
+    size = float(np.linalg.norm(np.ptp(triangles, axis=(0, 1))))
+    if max(radius, spacing) > _HUGE * size:
+        raise MeshError(
+            f"particles of radius {radius:.3g} m, {spacing:.3g} m apart, are far larger than the mesh, {size:.3g} m across; "
+            "check the mesh's scale"
+        )
+    area = float(Surface.areas_of(triangles).sum())
+    with np.errstate(over="ignore"):
+        number = 2.0 / np.sqrt(3.0) * (np.sqrt(area) / np.float64(spacing)) ** 2
+    if number > _BURIED * MOST:
+        raise _too_many(area, number, radius)
+
+
+def _too_many(area: float, number: float, radius: float) -> MeshError:
+    return MeshError(
+        f"a surface of {area:.3g} m^2 would need {number:.2g} particles of radius {radius:.3g} m; "
+        "check the mesh's scale, or take larger particles"
     )
 
 

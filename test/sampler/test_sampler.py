@@ -169,3 +169,17 @@ def test_options_that_make_no_sense_are_refused(sphere, options, reason):
 def test_radii_that_make_no_sense_are_refused(sphere, radius, reason):
     with pytest.raises(MeshError, match=reason):
         sample_body(sphere, radius=radius)
+
+
+@pytest.mark.parametrize("radius", [1e-300, 1e-7, 1e4, 1e300])
+def test_scales_that_make_no_sense_are_told_before_numbers_overflow(radius):
+    with pytest.raises(MeshError, match="check the mesh's scale"):
+        sample_body(trimesh.creation.box((1.0, 1.0, 1.0)), radius=radius)
+
+
+def test_millimetres_taken_for_metres_are_told():
+    mesh = trimesh.creation.box((1200.0, 700.0, 500.0))
+    with pytest.raises(MeshError, match="check the mesh's scale"):
+        sample_body(mesh, radius=1e-4)
+    with pytest.raises(MeshError, match="check the mesh's scale"):
+        sample_body(mesh, radius=0.1, count=10**15)
