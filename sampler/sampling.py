@@ -15,7 +15,7 @@ from sampler.measuring import measure_evenness
 from sampler.options import check_options
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
 from sampler.sheets import beyond_rims, closed_triangles, thick_plates
-from sampler.skin import Skin, free_triangles, touchable_parts, winding_before
+from sampler.skin import Skin, coinciding_layers, free_triangles, touchable_parts, winding_before
 from sampler.spreading import Observer, spread_particles
 from sampler.surface import Surface
 
@@ -92,7 +92,8 @@ def sample_body(
     if not len(free):
         raise MeshError("mesh: no part of its surface has an outside; check its orientation")
     fine = _spacing(radius, spacing, count, grain, free)
-    skin = Skin(touchable_parts(free, solid, fine), device)
+    parts = touchable_parts(free, solid, fine)
+    skin = Skin(parts, device, coinciding_layers(parts, solid) if solid else None)
     area = float(skin.areas.sum())
     for attempt in range(_TRIES):
         number = count if count is not None else particle_count(area, fine)

@@ -23,7 +23,20 @@ _ENOUGH = 15_000  # cuts for a body of few particles, whose mass is to be right,
 
 
 class Skin(Surface):
-    """Triangles with what random sampling and Warp kernels need."""
+    """Triangles with what random sampling and Warp kernels need.
+
+    Args:
+        triangles: shape (n, 3, 3) [m].
+        device: Warp device.
+        layers: of triangles that lie on one another, all among these, shape (n,); together they count once.
+
+    Attributes:
+        areas: their shares of the area, shape (n,) [m^2].
+    """
+
+    def __init__(self, triangles: np.ndarray, device: str = "cpu", layers: np.ndarray | None = None):
+        super().__init__(triangles, device)
+        self.areas = self.areas if layers is None else self.areas / layers
 
     def places(self, number: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         """Random places, so many over the area and as many over the longest edges, so that strips and specks get their share."""
@@ -66,7 +79,8 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
     parent = np.flatnonzero(Surface.areas_of(triangles) > 0.0)
     triangles = triangles[parent]
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
-    if _ask(places, normals, around)[0].all():
+    free, layers = _ask(places, normals, around)
+    if free.all() and np.all(layers == 1):
         return triangles, parent, np.ones(len(parent), int)
     most = len(triangles) // 2 + max(_MOST * float(Surface.areas_of(triangles).sum()) / spacing**2, _ENOUGH)
     pieces, parents, cuts = [], [], 0
@@ -113,6 +127,17 @@ def touchable_parts(triangles: np.ndarray, solid: Surface | None, spacing: float
         speck[speck] = np.linalg.norm(Surface(triangles[~speck]).closest(middle)[0] - middle, axis=1) > spacing
         triangles = triangles[~speck]
     return triangles
+
+
+def coinciding_layers(triangles: np.ndarray, solid: Surface) -> np.ndarray:
+    """How many faces of a solid that look the same way lie on one another all over its free parts, shape (n,), at least 1."""
+    layers, normals = np.full(len(triangles), np.iinfo(int).max), Surface.normals_of(triangles)
+    several = np.arange(len(triangles))
+    for weight in (*_CENTRE, *_THIRDS):
+        found = count_layers(weight @ triangles[several], normals[several], solid, _STEP * solid.unit)
+        layers[several] = np.clip(found, 1, layers[several])
+        several = several[layers[several] > 1]
+    return layers
 
 
 def _longest_edges(triangles: np.ndarray) -> np.ndarray:

@@ -345,6 +345,25 @@ def test_overlapping_parts_with_faces_in_one_plane_count_once(shift, turn):
     assert body.centre == pytest.approx(centre, abs=2e-3 * edge)
 
 
+@pytest.mark.parametrize("number", [2, 3])
+def test_where_faces_of_parts_coincide_area_counts_once(number):
+    """Boxes turned about their common axis, so that their tops make a star of ``4 number`` points."""
+    step = 0.25 * np.pi / number
+    boxes = [trimesh.creation.box((1.0, 1.0, 1.0)) for _ in range(number)]
+    for k, box in enumerate(boxes):
+        box.apply_transform(trimesh.transformations.rotation_matrix(2.0 * k * step, (0.0, 0.0, 1.0)))
+    tip, notch = np.sqrt(0.5), 0.5 / np.cos(0.25 * np.pi - step)
+    star = 8 * number * 0.5 * tip * notch * np.sin(step)
+    around = 8 * number * np.sqrt(tip**2 + notch**2 - 2.0 * tip * notch * np.cos(step))
+    spacing = 0.1
+    body = sample_body(trimesh.util.concatenate(boxes), radius=0.05, spacing=spacing)
+    assert body.area == pytest.approx(2.0 * star + around, rel=1e-9)
+    assert len(body) == pytest.approx(2.0 * body.area / (np.sqrt(3.0) * spacing**2), rel=0.01)
+    near = neighbours(body.points)
+    top = np.abs(body.points[:, 2]) > 0.499
+    assert near[top].mean() == pytest.approx(near[~top].mean(), rel=0.05)  # no denser there
+
+
 def test_no_particle_looks_into_the_wall_beside_it():
     number, height = 24, 0.05
     angle, reach = np.pi * np.arange(2 * number) / number, np.where(np.arange(2 * number) % 2, 0.1, 0.04)
