@@ -12,8 +12,8 @@ _ENOUGH = 0.63  # particles nearer than this need no next one, in spacings
 _WIDER = 4.0  # where none is found, they are looked for so much farther
 _SURVEYED = 5000  # of the places that have none near, so many are asked where it is
 _WORST = 100  # places from which the worst ones near by are sought
-_STEPS = 0.1 * 0.6 ** np.arange(10.0)  # how far beside them, one after another, in spacings
-_TRIALS = 4  # places tried in each step
+_STEPS = 0.12 * 0.7 ** np.arange(16.0)  # how far beside them, one after another, in spacings
+_TRIALS = 5  # places tried in each step
 
 
 def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Evenness:
