@@ -36,7 +36,7 @@ class ParticleBody:
         normals: outward normals of the faces they lie on, shape (n, 3).
         radius: of every particle [m].
         spacing: of the triangular lattice with as many particles on the same area [m].
-        area: that particles cover [m^2].
+        area: that particles cover [m^2], below the surface if they are inset.
         volume: of the solid [m^3]; NaN where it cannot be told.
         centre: centre of mass at uniform density, shape (3,) [m].
         inertia: about the centre per unit density, shape (3, 3) [m^5].

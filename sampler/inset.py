@@ -1,96 +1,179 @@
-"""Particles below the surface, so that a body keeps its outer size."""
+"""The surface one radius below the skin, so that a body of particles on it keeps its outer size."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
+from sampler.contour import contour_triangles
+from sampler.skin import halve_triangles, longest_edges
 from sampler.surface import Surface
 
-_STEPS, _TURNS = 12, 12
-_ON = 1e-9  # particles nearer than this to the surface lie on it, of the diagonal
-_AROUND = 2.0  # neighbours of a particle are nearer than this, so that a corner has some on each face; in spacings
-_APART = 0.5  # particles nearer than this after the move are dropped, in spacings
+_CELL = 0.25  # cells in which the surface is sought, in spacings; walls as thick as two of them have two skins
+_PIECE, _WIDE = 0.5, 4.0  # longest edge of pieces of walls, in spacings or radii, and of needles, in roots of their area
+_SHRINKS = 12  # of balls
+_TURNS, _SLOW, _SHORTEST = 40, 12.0, 0.06  # moves inward, and the least of them, in parts of the depth, and that when they fail
+_SLACK = 1e-6  # of the diagonal: a move that costs no more depth is none the worse, in single precision
+_OPPOSED = -0.8  # cosine between the normals of the two skins of a wall
+_FULL = 0.99  # share of a depth at which it counts as reached
+_ONE_LAYER = 0.05  # skins of a wall nearer than this to each other become one, in spacings
+_ASIDE = 0.02  # of the way to its middle: how far from its corners a piece is asked, so that no other face is there
+_FALLEN = 0.3  # share of their area that pieces of walls keep at least
+_ROW, _LINE = 0.87, 0.02  # rods thinner than particles count as so wide, and get this radius; in spacings
+_OWN = 0.3  # pieces nearer than this to the surface found so far belong to it, in spacings
 
 
-def inset_particles(
-    points: np.ndarray, normals: np.ndarray, around: Surface, radius: float, spacing: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Move particles inward until they are one radius below the surface, or as deep as a thin wall allows.
+@dataclass(frozen=True)
+class Inside:
+    """What lies in a solid, seen from its skin.
+
+    Attributes:
+        skin: free faces of the solid.
+        solid: closed surface.
+    """
+
+    skin: Surface
+    solid: Surface
+
+    def depth(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Depth of points, shape (n,) [m], negative outside, and the unit vector in which it decreases, shape (n, 3)."""
+        closest, face = self.skin.closest(points)
+        way = closest - points
+        length = np.linalg.norm(way, axis=1)
+        sign = np.where(np.abs(self.solid.winding(points)) > 0.5, 1.0, -1.0)
+        out = np.where(length[:, None] > 1e-9 * self.skin.unit, way * sign[:, None], self.skin.normals[face])
+        return sign * length, out / np.linalg.norm(out, axis=1, keepdims=True)
+
+    def balls(self, points: np.ndarray, normals: np.ndarray, most: float) -> tuple[np.ndarray, np.ndarray]:
+        """Radii of the largest balls inside that touch the skin in places, and its normals where else they do.
+
+        Args:
+            points: on the skin, shape (n, 3) [m].
+            normals: there, shape (n, 3).
+            most: radius [m].
+
+        Returns:
+            Shape (n,) [m]; shape (n, 3), the given normals where the ball is as large as can be.
+        """
+        radius, other = np.full(len(points), float(most)), normals.copy()
+        left = np.arange(len(points))
+        for _ in range(_SHRINKS):
+            centre = points[left] - radius[left, None] * normals[left]
+            touched, face = self.skin.closest(centre)
+            smaller = np.linalg.norm(touched - centre, axis=1) < radius[left] * (1.0 - 1e-5)
+            left, way = left[smaller], points[left[smaller]] - touched[smaller]
+            along = np.einsum("ij,ij->i", way, normals[left])
+            sound = along > 1e-12 * self.skin.unit
+            left, way, along, face = left[sound], way[sound], along[sound], face[smaller][sound]
+            if not len(left):
+                break
+            radius[left] = np.minimum(radius[left], 0.5 * np.einsum("ij,ij->i", way, way) / along)
+            other[left] = self.skin.normals[face]
+        return radius, other
+
+    def sink(self, points: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray]:
+        """Points moved to a depth [m], or as near to it as is possible in the solid around them, and how deep they then lie."""
+        place, share = points.copy(), np.ones(len(points))
+        depth, out = self.depth(place)
+        slack = _SLACK * self.skin.unit
+        left = np.arange(len(place))
+        for _ in range(_TURNS):
+            left = left[(np.abs(depth[left] - level) > 1e-6 * level) & (share[left] > _SHORTEST)]
+            if not len(left):
+                break
+            reach = share[left] * np.maximum(np.abs(depth[left]), level / _SLOW)
+            trial = place[left] - np.clip(level - depth[left], -reach, reach)[:, None] * out[left]
+            found, way = self.depth(trial)
+            nearer = np.abs(found - level) < np.abs(depth[left] - level) + slack  # where faces meet it takes several moves
+            share[left[~nearer]] *= 0.4
+            k = left[nearer]
+            place[k], depth[k], out[k] = trial[nearer], found[nearer], way[nearer]
+        return place, depth
+
+    def settle(self, points: np.ndarray, level: float, most: float) -> np.ndarray:
+        """Points in the solid moved to a depth [m], those that have not so far to go [m]; shape (n, 3) [m]."""
+        place, within = points.copy(), np.flatnonzero(self.depth(points)[0] > -_SLACK * self.skin.unit)
+        place[within] = self.sink(points[within], level)[0]
+        near = np.linalg.norm(place - points, axis=1) < most
+        return np.where(near[:, None], place, points)
+
+
+def inset_triangles(inside: Inside, radius: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """The surface one radius below the skin: where walls are thinner, the middle between their skins, in one layer.
+
+    Rods become lines: slender ones that count as wide as a row of particles.
 
     Args:
-        points: on the surface, shape (n, 3) [m].
-        normals: shape (n, 3).
-        around: closed surface of the solid.
-        radius: of the particles [m].
-        spacing: of the particles [m].
+        inside: of the solid; its skin must consist of what particles are to cover.
+        radius: [m].
+        spacing: of the particles to come [m].
 
     Returns:
-        Points, shape (m, 3) [m], and which of the given ones they were, shape (m,); where edges bring particles together, some
-        are left out.
+        Triangles, shape (n, 3, 3) [m], and the layers that each counts as, see ``Skin``, shape (n,).
     """
-    place, depth = points.copy(), np.zeros(len(points))
-    inward = -_mean_normals(points, normals, spacing)
-    for share in np.linspace(1.0 / _STEPS, 1.0, _STEPS):
-        place, depth = _deeper(place, depth, points + share * radius * inward, around, radius)
-    slack = _ON * around.unit
-    for _ in range(_TURNS):
-        closest, face = around.closest(place)
-        away = place - closest
-        length = np.linalg.norm(away, axis=1)
-        away[length <= slack] = -around.normals[face[length <= slack]]
-        reach = np.maximum(length, radius / _STEPS)
-        step = np.clip(radius - length, -reach, reach) / np.linalg.norm(away, axis=1)
-        place, depth = _deeper(place, depth, place + step[:, None] * away, around, radius, slack)
-    shallow = depth < 0.98 * radius
-    useless = shallow & _beside(place, ~shallow, spacing)  # stuck at an edge, beside one that came down
-    kept = _apart(place, _APART * spacing)
-    kept = kept[~useless[kept]]
-    return place[kept], kept
+    cell = _CELL * spacing
+    deep = radius + cell  # thinner walls may slip through between the cells
+    triangles = inside.skin.triangles
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    found = contour_triangles(inside.depth, low - 0.37 * cell, high + 0.37 * cell, radius, cell)
+    pieces = _pieces(triangles, _PIECE * max(spacing, radius))
+    middle, normals = pieces.mean(axis=1), Surface.normals_of(pieces)
+    ball, other = inside.balls(middle, normals, deep)
+    wall = (ball < _FULL * deep) & (np.einsum("ij,ij->i", normals, other) < _OPPOSED)
+    aim = np.random.default_rng(0).standard_normal(3)
+    if wall.any():
+        found = found[~_in_walls(inside, found, deep)]
+        # Where the skins meet in the middle, only those pieces are taken that look one way more than the others.
+        taken = wall & ((ball > radius + 0.5 * _ONE_LAYER * spacing) | ((normals - other) @ aim > 0.0))
+        sheets, taken = _images(inside, pieces[taken], normals[taken], radius), np.flatnonzero(taken)
+        narrow = Surface.areas_of(sheets) < _FALLEN * Surface.areas_of(pieces[taken])  # at rims, and in rods
+        wall[taken[narrow]] = False
+        found = np.concatenate([found, sheets[~narrow]])
+    layers = np.ones(len(found))
+    rest = np.flatnonzero((ball < _FULL * deep) & ~wall & (normals @ aim > 0.0))
+    place, depth = inside.sink(middle[rest] - ball[rest, None] * normals[rest], deep)
+    rest, place, depth = (values[depth < _FULL * deep] for values in (rest, place, depth))
+    if len(rest) and len(found):
+        away = np.linalg.norm(Surface(found).closest(place)[0] - place, axis=1)
+        rest = rest[away > np.maximum(0.0, depth - radius) + _OWN * spacing]
+    if len(rest):
+        rods = _images(inside, pieces[rest], normals[rest], radius)
+        way = pieces[rest] - rods
+        length = np.linalg.norm(way, axis=(1, 2), keepdims=True) / np.sqrt(3.0)
+        length = np.maximum(length, np.finfo(float).tiny)
+        rods += way * np.minimum(0.5, _LINE * spacing / length)
+        row = Surface.areas_of(pieces[rest]) * _ROW * spacing / (np.pi * length[:, 0, 0])  # half of a rod looks one way
+        found = np.concatenate([found, rods])
+        layers = np.append(layers, Surface.areas_of(rods) / row)
+    sound = Surface.areas_of(found) > 0.0
+    return found[sound], layers[sound]
 
 
-def _deeper(place, depth, trial, around, radius, slack=0.0):
-    """The trial where it is nearer to the wanted depth, or within the slack: where faces meet it takes several moves."""
-    closest, _ = around.closest(trial)
-    found = np.linalg.norm(trial - closest, axis=1) * np.where(np.abs(around.winding(trial)) > 0.5, 1.0, -1.0)
-    better = np.abs(found - radius) < np.abs(depth - radius) + slack
-    return np.where(better[:, None], trial, place), np.where(better, found, depth)
+def _pieces(triangles: np.ndarray, longest: float) -> np.ndarray:
+    """Triangles cut until they are so small [m]."""
+    parts = []
+    while len(triangles):
+        large = np.minimum(longest_edges(triangles), _WIDE * np.sqrt(Surface.areas_of(triangles))) > longest
+        parts.append(triangles[~large])
+        triangles = halve_triangles(triangles[large])
+    return np.concatenate(parts)
 
 
-def _mean_normals(points: np.ndarray, normals: np.ndarray, spacing: float) -> np.ndarray:
-    """Mean over neighbours that do not face the other way, so that particles on an edge move into the solid."""
-    mean = normals.copy()
-    for k in _blocks(points, _AROUND * spacing):
-        for i in k[0]:
-            near = np.linalg.norm(points[k[1]] - points[i], axis=1) < _AROUND * spacing
-            same = near & (normals[k[1]] @ normals[i] > -0.5)
-            mean[i] = normals[k[1]][same].sum(axis=0)
-    return mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+def _in_walls(inside: Inside, triangles: np.ndarray, deep: float) -> np.ndarray:
+    """Whether triangles one radius below the skin lie in walls too thin for the cells, shape (n,)."""
+    middle = triangles.mean(axis=1)
+    touched, _ = inside.skin.closest(middle)
+    up = touched - middle
+    up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), np.finfo(float).tiny)
+    ball, other = inside.balls(touched, up, deep)
+    return (ball < _FULL * deep) & (np.einsum("ij,ij->i", up, other) < _OPPOSED)
 
 
-def _beside(points: np.ndarray, those: np.ndarray, reach: float) -> np.ndarray:
-    """Whether one of those lies within reach of each point."""
-    found = np.zeros(len(points), bool)
-    for inside, around in _blocks(points, reach):
-        others = points[around[those[around]]]
-        for i in inside:
-            found[i] = np.any(np.linalg.norm(others - points[i], axis=1) < reach)
-    return found
-
-
-def _blocks(points: np.ndarray, width: float):
-    """Cells of a grid: numbers of the points in each, and in it and the cells around."""
-    cell = np.floor((points - points.min(axis=0)) / width).astype(int)
-    members: dict[tuple, list[int]] = {}
-    for i, key in enumerate(map(tuple, cell)):
-        members.setdefault(key, []).append(i)
-    for (x, y, z), inside in members.items():
-        around = [i for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (-1, 0, 1) for i in members.get((x + a, y + b, z + c), ())]
-        yield inside, np.array(around)
-
-
-def _apart(points: np.ndarray, least: float) -> np.ndarray:
-    """Numbers of points, the first of those nearer than ``least`` to one another."""
-    keep = np.ones(len(points), bool)
-    for inside, around in _blocks(points, least):
-        for i in inside:
-            near = around[around < i]
-            keep[i] = not np.any(keep[near] & (np.linalg.norm(points[near] - points[i], axis=1) < least))
-    return np.flatnonzero(keep)
+def _images(inside: Inside, pieces: np.ndarray, normals: np.ndarray, radius: float) -> np.ndarray:
+    """Where the corners of pieces of the skin come to lie."""
+    corners = pieces + _ASIDE * (pieces.mean(axis=1, keepdims=True) - pieces)
+    corners, up = corners.reshape(-1, 3), np.repeat(normals, 3, axis=0)
+    ball, other = inside.balls(corners, up, radius)
+    place = corners - ball[:, None] * up
+    stuck = np.flatnonzero((ball < _FULL * radius) & (np.einsum("ij,ij->i", up, other) > _OPPOSED))  # at another face
+    place[stuck] = inside.sink(place[stuck], radius)[0]
+    return place.reshape(-1, 3, 3)

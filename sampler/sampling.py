@@ -8,8 +8,9 @@ import trimesh
 
 from sampler.body import ParticleBody
 from sampler.errors import MeshError
-from sampler.inset import inset_particles
+from sampler.inset import Inside, inset_triangles
 from sampler.lattice import lattice_spacing, particle_count
+from sampler.limits import MOST, broken_limits, check_scale, too_many
 from sampler.mass import integrate, is_physical
 from sampler.measuring import measure_evenness
 from sampler.options import check_options
@@ -20,10 +21,6 @@ from sampler.spreading import Observer, spread_particles
 from sampler.surface import Surface
 
 SPACING = 1.5  # default distance between neighbours in particle radii; below 2 so that particles overlap into a closed skin
-MOST = 2_000_000  # particles, more are not meant
-_BURIED = 10.0  # times as large as what can be touched, at most, is all of a surface that is worth cutting
-_HUGE = 1000.0  # particles of so many diagonals are not meant
-
 _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest grain
 _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
@@ -60,7 +57,8 @@ def sample_body(
         progress: called with the share of the work done, 0 to 1.
         count: wanted number of particles, instead of a spacing.
         grain: radius of the smallest grain that must not pass [m].
-        inset: put the centres one radius below the surface, so that the body keeps its outer size; they lie on it if False.
+        inset: put the centres one radius below the surface, so that the body keeps its outer size, and in the middle of
+            thinner walls; on the surface if False, and in sheets in any case.
         thickness: of sheets [m]; up to two radii, and if None, one layer of particles lies in the sheet itself.
         sheets: which open components are sheets, see ``repair_mesh``.
         observe: called with the particles, shape (n, 3) [m], as they relax.
@@ -73,7 +71,7 @@ def sample_body(
     check_options(lengths, count, seed, device)
     repaired = mesh if isinstance(mesh, RepairedMesh) else repair_mesh(mesh, sheets)
     thickness = 2.0 * radius if thickness is None else thickness
-    _check_scale(repaired.triangles, radius, _spacing(radius, spacing, count, grain, repaired.triangles))
+    check_scale(repaired.triangles, radius, _spacing(radius, spacing, count, grain, repaired.triangles))
     closed, owner = closed_triangles(repaired, thickness)
     fine = _spacing(radius, spacing, count, grain, closed)
     around = solid = Surface(closed, device)
@@ -92,17 +90,24 @@ def sample_body(
     if not len(free):
         raise MeshError("mesh: no part of its surface has an outside; check its orientation")
     fine = _spacing(radius, spacing, count, grain, free)
-    parts = touchable_parts(free, solid, fine)
-    skin = Skin(parts, device, coinciding_layers(parts, solid) if solid else None)
+    outer = skin = _skin(free, solid, fine, device)
+    settle = partial(_clear_creases, skin=skin, solid=solid) if solid else None
+    inside = None
+    if inset and solid:
+        inside = Inside(_skin(free[: len(free) - len(plates)], solid, fine, device), solid)
+        plates = touchable_parts(plates, solid, fine) if len(plates) else plates
+        skin, settle = _inset_skin(inside, plates, radius, fine, count), None
     area = float(skin.areas.sum())
     for attempt in range(_TRIES):
         number = count if count is not None else particle_count(area, fine)
         if number > MOST:
-            raise _too_many(area, number, radius)
+            raise too_many(area, number, radius)
         h = lattice_spacing(area, number)
-        settle = partial(_clear_creases, skin=skin, solid=solid, spacing=h) if solid else lambda *placed: placed
-        beyond = beyond_rims(repaired.vertices, sheet, skin, h)
-        points, normals = spread_particles(skin, number, seed, progress, observe, settle, beyond)
+        beyond = beyond_rims(repaired.vertices, sheet, outer, h)
+        move = partial(settle, spacing=h) if settle else lambda *placed: placed
+        points, normals = spread_particles(skin, number, seed, progress, observe, move, beyond)
+        if inside:
+            points = inside.settle(points, radius, 0.2 * h)
         evenness = measure_evenness(skin, points, normals)
         h = lattice_spacing(area, len(points))
         if grain is None or evenness.coverage * h < radius + grain:
@@ -113,9 +118,7 @@ def sample_body(
                 f"particle of radius {radius:.3g} m; take more or larger particles"
             )
         fine *= _FINER
-    if inset:
-        points, kept = inset_particles(points, normals, around, radius, h)
-        normals = normals[kept]
+    warnings += broken_limits(evenness, len(points), number, radius, solid.unit if solid else skin.unit)
     return ParticleBody(
         points=points,
         normals=normals,
@@ -133,26 +136,23 @@ def sample_body(
     )
 
 
-def _check_scale(triangles: np.ndarray, radius: float, spacing: float) -> None:
-    """Refuse numbers that cannot be meant before anything is cut for them, which takes long or overflows."""
-    size = float(np.linalg.norm(np.ptp(triangles, axis=(0, 1))))
-    if max(radius, spacing) > _HUGE * size:
-        raise MeshError(
-            f"particles of radius {radius:.3g} m, {spacing:.3g} m apart, are far larger than the mesh, {size:.3g} m across; "
-            "check the mesh's scale"
-        )
-    area = float(Surface.areas_of(triangles).sum())
-    with np.errstate(over="ignore"):
-        number = 2.0 / np.sqrt(3.0) * (np.sqrt(area) / np.float64(spacing)) ** 2
-    if number > _BURIED * MOST:
-        raise _too_many(area, number, radius)
+def _skin(free: np.ndarray, solid: Surface | None, spacing: float, device: str) -> Skin:
+    parts = touchable_parts(free, solid, spacing)
+    return Skin(parts, device, coinciding_layers(parts, solid) if solid else None)
 
 
-def _too_many(area: float, number: float, radius: float) -> MeshError:
-    return MeshError(
-        f"a surface of {area:.3g} m^2 would need {number:.2g} particles of radius {radius:.3g} m; "
-        "check the mesh's scale, or take larger particles"
-    )
+def _inset_skin(inside: Inside, plates: np.ndarray, radius: float, spacing: float, count: int | None) -> Skin:
+    """The surface one radius below the skin, and plates as they are; as fine as the count asks for there, if one is given."""
+    for _ in range(_TRIES):
+        triangles, layers = inset_triangles(inside, radius, spacing)
+        if len(triangles) + len(plates) == 0:
+            raise MeshError(f"mesh: particles of radius {radius:.3g} m find no room in it; take smaller ones, or no inset")
+        skin = Skin(np.concatenate([triangles, plates]), inside.skin.device, np.append(layers, np.ones(len(plates))))
+        finer = spacing if count is None else lattice_spacing(float(skin.areas.sum()), count)
+        if finer > 0.8 * spacing:
+            break
+        spacing = finer
+    return skin
 
 
 def _clear_creases(

@@ -40,7 +40,7 @@ class Skin(Surface):
 
     def places(self, number: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         """Random places, so many over the area and as many over the longest edges, so that strips and specks get their share."""
-        edge = _longest_edges(self.triangles)
+        edge = longest_edges(self.triangles)
         both = self.sample(number, random), self.sample(number, random, edge + edge.mean())
         return tuple(np.concatenate(pair) for pair in zip(*both, strict=True))
 
@@ -85,7 +85,7 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
     most = len(triangles) // 2 + max(_MOST * float(Surface.areas_of(triangles).sum()) / spacing**2, _ENOUGH)
     pieces, parents, cuts = [], [], 0
     for _ in range(_DEEPEST):
-        edge = _longest_edges(triangles)
+        edge = longest_edges(triangles)
         worth = np.flatnonzero(edge > (0.0 if cuts < most else _FINEST * spacing))
         crossed, normals, places = crossing_planes(triangles[worth], around, _STEP * around.unit)
         crossed = worth[crossed]
@@ -99,7 +99,7 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
             break
         small = edge <= _ISLAND * spacing
         parts, origin = cut_triangles(triangles[small], normals[small], places[small])
-        triangles = np.concatenate([_halve(triangles[~small]), parts])
+        triangles = np.concatenate([halve_triangles(triangles[~small]), parts])
         parent = np.concatenate([np.tile(parent[~small], 2), parent[small][origin]])
     pieces.append(triangles)
     parents.append(parent)
@@ -115,13 +115,13 @@ def touchable_parts(triangles: np.ndarray, solid: Surface | None, spacing: float
     those are the skin there; the ends of slits; and specks, such as pinholes between parts, farther than a spacing from the rest.
     """
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
-    narrow = _NARROW * np.linalg.norm(high - low) * _longest_edges(triangles)
+    narrow = _NARROW * np.linalg.norm(high - low) * longest_edges(triangles)
     triangles = triangles[2.0 * Surface.areas_of(triangles) > narrow]
     if solid is not None:
         triangles = _outside_slits(np.delete(triangles, _folds(triangles, solid), axis=0), solid, spacing)
     island = _islands(triangles, 0.25 * spacing)
     speck = np.bincount(island, Surface.areas_of(triangles))[island] < _SPECK * spacing**2
-    speck &= _longest_edges(triangles) < 0.25 * spacing
+    speck &= longest_edges(triangles) < 0.25 * spacing
     if speck.any() and not speck.all():
         middle = triangles[speck].mean(axis=1)
         speck[speck] = np.linalg.norm(Surface(triangles[~speck]).closest(middle)[0] - middle, axis=1) > spacing
@@ -140,7 +140,8 @@ def coinciding_layers(triangles: np.ndarray, solid: Surface) -> np.ndarray:
     return layers
 
 
-def _longest_edges(triangles: np.ndarray) -> np.ndarray:
+def longest_edges(triangles: np.ndarray) -> np.ndarray:
+    """Of each triangle, shape (n, 3, 3) [m]; shape (n,) [m]."""
     return np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
 
 
@@ -163,7 +164,7 @@ def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.
     pieces, parent = triangles, np.arange(len(triangles))
     whole, parts = np.ones(len(triangles), bool), [(triangles[:0], parent[:0])]
     while len(pieces):
-        size = np.minimum(_longest_edges(pieces), _WIDE * np.sqrt(Surface.areas_of(pieces)))  # needles would become very many
+        size = np.minimum(longest_edges(pieces), _WIDE * np.sqrt(Surface.areas_of(pieces)))  # needles would become very many
         small, tiny, room = size <= _LARGE * spacing, size <= _SLIT * spacing, np.full(len(pieces), np.nan)
         for asked, weights in ((tiny, _CENTRE), (small & ~tiny, _THIRDS)):
             room[asked] = _room(pieces[asked], weights, outside[asked], solid, step)
@@ -171,7 +172,7 @@ def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.
         stays = done & (room > 0.5)
         whole[parent[done & ~stays]] = False
         parts.append((pieces[stays], parent[stays]))
-        pieces, parent, outside = _halve(pieces[~done]), np.tile(parent[~done], 2), np.tile(outside[~done], (2, 1))
+        pieces, parent, outside = halve_triangles(pieces[~done]), np.tile(parent[~done], 2), np.tile(outside[~done], (2, 1))
     pieces, parent = map(np.concatenate, zip(*parts, strict=True))
     return np.concatenate([triangles[whole], pieces[~whole[parent]]])
 
@@ -210,7 +211,7 @@ def _ask(points: np.ndarray, normals: np.ndarray, around: Surface) -> tuple[np.n
     return free, np.maximum(layers, 1)
 
 
-def _halve(triangles: np.ndarray) -> np.ndarray:
+def halve_triangles(triangles: np.ndarray) -> np.ndarray:
     """Cut at the middle of the longest edge, so that thin triangles do not breed."""
     edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
     turn = (edge.argmax(axis=1)[:, None] + np.arange(3)) % 3

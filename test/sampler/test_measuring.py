@@ -53,3 +53,12 @@ def test_however_far_the_worst_place_is():
     assert body.evenness.farthest * body.spacing == pytest.approx(apart.min(axis=1).max(), rel=1e-4)
     with pytest.raises(MeshError, match="could pass"):
         sample_body(bar, radius=15.0, count=50, grain=0.9 * worst - 15.0)
+
+
+def test_what_lies_otherwise_than_it_should_is_told():
+    assert sample_body(trimesh.creation.box((0.1, 0.07, 0.05)), radius=0.004).warnings == ()
+    bar = sample_body(trimesh.creation.box((1000.0, 1.0, 1.0)), radius=15.0, count=50)
+    assert f"farthest {bar.evenness.farthest:.2f} (at most 1.1)" in bar.warnings[-1]
+    assert f"coverage {bar.evenness.coverage:.2f} (at most 1)" in bar.warnings[-1]
+    large = sample_body(trimesh.creation.box((1.0, 1.0, 1.0)), radius=10.0)
+    assert "about as large as the mesh, 1.73 m across" in large.warnings[-1]
