@@ -30,7 +30,7 @@ from sand_sim.world import World
 PACINGS = ("realtime", "fast", "lockstep")
 _LATEST = 0.2  # [s] that real time may lag behind before the arrears are forgotten
 _NAP = 0.05  # [s]
-_MOST_UNREAD = 10_000
+MOST_UNREAD = 10_000  # commands that wait for the stepping thread
 
 
 class Simulation:
@@ -116,13 +116,13 @@ class Simulation:
     def submit(self, command: Command) -> None:
         """Hand a command over; it is checked and carried out, or rejected and counted, before the next step."""
         with self._wake:
-            full = len(self._inbox) >= _MOST_UNREAD
+            full = len(self._inbox) >= MOST_UNREAD
             if not full:
                 self._inbox.append(command)
                 self._wake.notify_all()
         if full:
             self.reject(
-                CommandError("flooded", f"tool '{command.tool}': {_MOST_UNREAD} commands have come in since the last frame")
+                CommandError("flooded", f"tool '{command.tool}': {MOST_UNREAD} commands have come in since the last frame")
             )
 
     def reject(self, error: CommandError) -> None:

@@ -12,8 +12,10 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from sand_sim.node.quality import overridable, usual_quality, warn_of_publisher, warn_of_subscriber
+from sand_sim.simulation import MOST_UNREAD
 
-COMMANDS_DEPTH = 100
+COMMANDS_DEPTH = MOST_UNREAD  # the middleware overwrites what is more without a word; the simulation refuses it and counts
+_MOST_IN_TURN = 100  # messages of one topic that are heard before others get their turn
 _RESTS, _LONGEST_REST = 8.0, 0.005  # after messages came in: times the processor time that took, and at most [s]
 _MANY = 8  # messages that came in at once, after which there is no time to rest
 
@@ -44,13 +46,13 @@ class Connections:
         return made
 
     def subscription(self, kind: type, topic: str, hear: Callable, latched: bool = False) -> None:
-        """Reliable, keep last 100."""
+        """Reliable, keep last of as many as may wait for the simulation, so that all of a path sent at once are heard."""
 
         def hear_all(message: Any) -> None:
             hear(message)
             # What else has come in is taken at once: the executor needs ten times as long to bring one message.
             heard = 1
-            while heard <= COMMANDS_DEPTH:
+            while heard <= _MOST_IN_TURN:
                 with made.handle:
                     taken = made.handle.take_message(kind, False)
                 if taken is None:

@@ -28,8 +28,8 @@ class Chatter:
         self.executor.add_node(self.node)
 
     def say(self, number: int) -> None:
-        for _ in range(number):
-            self.publisher.publish(String(data=str(len(self.heard))))
+        for k in range(number):
+            self.publisher.publish(String(data=str(k)))
 
     def listen(self, number: int) -> None:
         end = time.monotonic() + 20.0
@@ -72,9 +72,17 @@ def test_no_rest_where_each_message_counts(chatter):
 
 def test_no_rest_after_many_messages(chatter):
     one = chatter(in_haste=False)
-    one.say(COMMANDS_DEPTH // 2)
+    one.say(50)
     time.sleep(0.2)
     one.rests.clear()
-    one.listen(COMMANDS_DEPTH // 2)
-    assert len(one.heard) == COMMANDS_DEPTH // 2
+    one.listen(50)
+    assert len(one.heard) == 50
     assert one.rests == []
+
+
+def test_all_that_was_said_at_once_is_heard(chatter):
+    """Also where the executor is too busy to listen meanwhile."""
+    one = chatter(in_haste=True)
+    one.say(1000)
+    one.listen(1000)
+    assert one.heard == [str(number) for number in range(1000)]

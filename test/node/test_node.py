@@ -1,5 +1,6 @@
 """The node with real publishers, subscribers and services."""
 
+import threading
 import time
 
 import numpy as np
@@ -10,6 +11,7 @@ rclpy = pytest.importorskip("rclpy", reason="needs ROS 2")
 pytestmark = pytest.mark.xdist_group("processes")  # one after the other, so that each knows what it has left behind
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseStamped
 from node_client import PATIENCE, START, Client, drive
 from scenes import write_small_scene
 from std_srvs.srv import Trigger
@@ -37,6 +39,33 @@ def test_poses_in_wrench_and_cloud_out(client, start_node):
     assert client.clouds[-1].header.frame_id == "world"
     assert set(points["id"]) == set(range(32))
     assert node.simulation.rejected == {}
+
+
+def test_all_of_a_path_sent_at_once_is_passed(client, start_node):
+    """A thousand poses, of which the first is not taken before the last has been sent; corners lie at the ends of frames."""
+    node = start_node(pacing="lockstep", points_rate=0.0)
+    sent, taken, submit = threading.Event(), [], node.simulation.submit
+
+    def hear(command):
+        sent.wait(PATIENCE)
+        taken.append(command.time)
+        submit(command)
+
+    node.simulation.submit = hear
+    shown = []
+    client.node.create_subscription(PoseStamped, "/sand_sim/tools/plate/pose_actual", shown.append, 200)
+    client.connect()
+    times = 0.002 * np.arange(1, 1001)
+    heights = 0.005 * np.abs((times / 0.02 + 1.0) % 2.0 - 1.0)
+    for at, height in zip(times, heights, strict=True):
+        client.send(START + [0.0, 0.0, height], at=at)
+    sent.set()
+    client.wait_for(lambda: shown and stamp_to_time(shown[-1].header.stamp) > times[-1] - 1e-6)
+    assert taken == pytest.approx(times)
+    assert node.simulation.rejected == {}
+    corners = {round(stamp_to_time(message.header.stamp) / 0.02): message.pose.position.z for message in shown}
+    for k in range(1, 101):
+        assert corners[k] - START[2] == pytest.approx(0.005 * (k % 2), abs=2e-5), f"corner {k}"
 
 
 def test_same_run_in_another_process_gives_the_same_wrenches(client, start_process, start_node, tmp_path):
