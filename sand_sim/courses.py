@@ -2,7 +2,7 @@
 
 In lockstep every command must carry a time, and times of one tool must rise. Otherwise
 
-    without a time                 it replaces all before it, and is reached after the time that passed since the command before
+    without a time                 it replaces all before it, and is reached after the simulated time since the command before
     time ahead of the simulation   it waits for its turn and is reached at its time, however much comes after it
     time just behind               (measured poses that come in with a delay) as without one, but reached after the time between
                                    its stamp and the stamp before
@@ -78,11 +78,12 @@ class Courses:
 
     Attributes:
         limited: number of commands that were slowed to keep to ``max_speed``.
+        unstamped: number of poses without a time that were carried out.
         shift: from the clock of relative stamps to simulated time [s]; None before the first of them.
     """
 
     def __init__(self, world: World, lockstep: bool, rules: StampRules):
-        self.lockstep, self.rules, self.limited = lockstep, rules, 0
+        self.lockstep, self.rules, self.limited, self.unstamped = lockstep, rules, 0, 0
         self._world = world
         self.clear()
 
@@ -185,7 +186,8 @@ class Courses:
         """Whether it is reached at its own time; poses only, outside lockstep."""
         if self.lockstep:
             return True
-        return isinstance(command, ToolPose) and command.time is not None and command.time > self._world.time
+        ahead = self._world.time + 0.5 * self._world.time_step  # stamps are rounded to nanoseconds: that of now may lie above it
+        return isinstance(command, ToolPose) and command.time is not None and command.time > ahead
 
     def _append(self, command: Command) -> None:
         course, now = self.by_tool[command.tool], self._world.time
@@ -209,6 +211,7 @@ class Courses:
         course.promised, course.last_taken = -np.inf, now
         if command.time is None:
             course.last_stamp = min(course.last_stamp, now)  # later ones have been discarded
+            self.unstamped += isinstance(command, ToolPose)
         else:
             course.followed_stamp = command.time
 

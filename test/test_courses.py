@@ -108,6 +108,18 @@ def test_a_pose_without_stamp_replaces_all_that_wait(driven):
     assert not driven.rejected
 
 
+@pytest.mark.parametrize("rounding", [-4e-10, 0.0, 4e-10])
+def test_a_pose_stamped_now_is_no_pose_ahead(driven, rounding):
+    """Stamps are rounded to nanoseconds: one of the clock's last time may lie above simulated time by less than nothing."""
+    for k in range(1, 6):
+        driven.go_to(0.02 * k)
+        driven.take(pose(0.001 * k, driven.world.time + rounding))
+    driven.go_to(0.115)
+    assert not driven.rejected
+    assert driven.courses.limited == 0
+    assert driven.tool.velocity[2] == pytest.approx(0.05, rel=0.02)
+
+
 def test_a_delayed_stream_keeps_its_speed(driven):
     """Poses measured every 20 ms that come in 50 ms late, and unevenly."""
     sent = 0

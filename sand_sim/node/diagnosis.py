@@ -2,12 +2,14 @@
 
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from msg_adapters.diagnostic_msgs import health_to_diagnostics
 from sand_sim.border import Observation
+from sand_sim.node.lag import LagWatch
 from sand_sim.simulation import Simulation
 
 
@@ -17,10 +19,12 @@ class Diagnosis:
     Args:
         simulation: that runs.
         name: of the node.
+        warn: takes what there is to say of it once.
     """
 
-    def __init__(self, simulation: Simulation, name: str):
+    def __init__(self, simulation: Simulation, name: str, warn: Callable[[str], None]):
         self._simulation, self._name = simulation, name
+        self._lag = LagWatch(simulation, warn)
         self._before = (time.monotonic(), 0.0)
 
     def tell(self, last: Observation, dropped: int) -> DiagnosticArray:
@@ -43,9 +47,13 @@ class Diagnosis:
         } | {f"commands rejected: {reason}": str(count) for reason, count in rejected.items()}
         device = simulation.world.assembly.solver.device.label
         message = health_to_diagnostics(last.health, last.time, f"{self._name}: world", device, further)
+        status, lag = message.status[0], self._lag.look(last.time)
+        if lag:
+            status.message = lag if status.level == DiagnosticStatus.OK else f"{status.message}; {lag}"
+            status.level = DiagnosticStatus.WARN
         if simulation.fault is not None:
-            message.status[0].level = DiagnosticStatus.ERROR
-            message.status[0].message = f"stepping has stopped: {simulation.fault}"
+            status.level = DiagnosticStatus.ERROR
+            status.message = f"stepping has stopped: {simulation.fault}"
         return message
 
     def _real_time_factor(self, simulated: float) -> float:
