@@ -6,7 +6,9 @@ In lockstep every command must carry a time, and times of one tool must rise. Ot
     time ahead of the simulation   it waits for its turn and is reached at its time, however much comes after it
     time just behind               (measured poses that come in with a delay) as without one, but reached after the time between
                                    its stamp and the stamp before
-    time not after the one before  refused as ``out_of_order``
+    the time of the one before     (a clock that ticks more seldom) it takes the place of that one and is given as much time
+    time before the one before     refused as ``out_of_order``, in lockstep also the same time: which of two counts would depend
+                                   on which comes before time goes on
     time too far behind            refused as ``too_old``
     time too far ahead             refused as ``future``: mostly a stamp of the wall clock
 
@@ -79,11 +81,13 @@ class Courses:
     Attributes:
         limited: number of commands that were slowed to keep to ``max_speed``.
         unstamped: number of poses without a time that were carried out.
+        alike: number of commands with the time of the one before, which have taken its place.
         shift: from the clock of relative stamps to simulated time [s]; None before the first of them.
     """
 
     def __init__(self, world: World, lockstep: bool, rules: StampRules):
-        self.lockstep, self.rules, self.limited, self.unstamped = lockstep, rules, 0, 0
+        self.lockstep, self.rules = lockstep, rules
+        self.limited = self.unstamped = self.alike = 0
         self._world = world
         self.clear()
 
@@ -151,7 +155,9 @@ class Courses:
             return None
         self.shift = shift
         if command.time is not None:
-            self.by_tool[command.tool].last_stamp = command.time
+            course = self.by_tool[command.tool]
+            self.alike += command.time == course.last_stamp
+            course.last_stamp = command.time
         return command
 
     def _check_stamp(self, command: Command, course: Course) -> None:
@@ -171,7 +177,7 @@ class Courses:
                 "time (use_sim_time and /clock), or zero for as soon as possible; with the node's parameter stamps:=relative "
                 "they are counted from the first one, with stamps:=ignored any are taken for zero",
             )
-        if command.time <= course.last_stamp:
+        if command.time < course.last_stamp or (self.lockstep and command.time == course.last_stamp):
             raise CommandError(
                 "out_of_order", f"{stamp} must be later than {course.last_stamp:.6f} s, the stamp before; reset to begin anew"
             )
@@ -191,7 +197,11 @@ class Courses:
 
     def _append(self, command: Command) -> None:
         course, now = self.by_tool[command.tool], self._world.time
-        if self.lockstep or course.promised > now:
+        if course.waiting and command.time == course.waiting[-1].time:
+            course.waiting[-1] = command
+        elif command.time == course.promised:
+            self._reach(command, command.time)
+        elif self.lockstep or course.promised > now:
             course.waiting.append(command)
         else:
             self._world.apply(command)  # what is under way has no time of its own to keep to
@@ -202,11 +212,14 @@ class Courses:
         if isinstance(command, ToolVelocity):
             target, interval = self._pose_within_reach(command, rules.hold), rules.hold
         else:
-            since = now - course.last_taken if command.time is None else command.time - course.followed_stamp
+            if command.time is None:
+                since = now - course.last_taken
+            elif command.time == course.followed_stamp:
+                since = self._world.arrival(command.tool) - course.last_taken  # as the one whose place it takes
+            else:
+                since = command.time - course.followed_stamp
             target, interval = command, max(min(since, rules.gap), self._world.time_step)
-        soonest = self._world.travel(target) / self._world.scene.tool(command.tool).max_speed
-        self._world.apply(replace(target, time=now + max(interval, soonest)))
-        self.limited += soonest > 1.000001 * interval
+        self._reach(target, now + interval)
         course.waiting.clear()
         course.promised, course.last_taken = -np.inf, now
         if command.time is None:
@@ -214,6 +227,13 @@ class Courses:
             self.unstamped += isinstance(command, ToolPose)
         else:
             course.followed_stamp = command.time
+
+    def _reach(self, pose: ToolPose, end: float) -> None:
+        """Set a tool on its way to a pose, to be there at a time [s], or later if it may not be so fast."""
+        now = self._world.time
+        soonest = self._world.travel(pose) / self._world.scene.tool(pose.tool).max_speed
+        self._world.apply(replace(pose, time=max(end, now + soonest)))
+        self.limited += soonest > 1.000001 * (end - now)
 
     def _pose_within_reach(self, velocity: ToolVelocity, duration: float) -> ToolPose:
         """Where a velocity leads, made smaller in its direction if it is above ``max_speed``."""

@@ -60,7 +60,6 @@ def velocity(linear, angular=(0.0, 0.0, 0.0), in_tool_frame=False, at=None):
         ([pose(0.0, 1.8e9)], "future"),  # the wall clock
         ([pose(0.0, 0.3)], "too_old"),
         ([pose(0.0, 1.02), pose(0.0, 1.01)], "out_of_order"),
-        ([pose(0.0, 1.02), pose(0.0, 1.02)], "out_of_order"),
         ([pose(0.0, 0.95), pose(0.0, 0.94)], "out_of_order"),
         ([pose(0.4, 1.02)], "too_fast"),
         ([velocity((np.inf, 0.0, 0.0))], "not_finite"),
@@ -118,6 +117,58 @@ def test_a_pose_stamped_now_is_no_pose_ahead(driven, rounding):
     assert not driven.rejected
     assert driven.courses.limited == 0
     assert driven.tool.velocity[2] == pytest.approx(0.05, rel=0.02)
+
+
+def test_of_poses_with_one_stamp_the_last_counts(driven):
+    """Ahead of time: while they wait for their turn, and while the tool is under way to the first of them."""
+    driven.take(pose(0.001, 0.1), pose(0.0, 0.2), pose(0.003, 0.2))
+    driven.go_to(0.15)
+    driven.take(pose(0.005, 0.2))
+    driven.go_to(0.2)
+    assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.005], abs=1e-6)
+    driven.take(pose(0.005, 0.4), pose(0.007, 0.6))
+    driven.go_to(0.3)
+    driven.take(pose(0.009, 0.6))
+    driven.go_to(0.4)
+    assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.005], abs=1e-6), "what is to be passed before is passed"
+    driven.go_to(0.6)
+    assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.009], abs=1e-6)
+    assert not driven.rejected
+    assert driven.courses.alike == 3
+
+
+def test_the_last_of_one_stamp_comes_too_late_for_its_time(driven):
+    driven.take(pose(0.0, 0.1))
+    driven.go_to(0.099)
+    driven.take(pose(0.05, 0.1))
+    driven.go_to(0.2)
+    assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.05], abs=1e-6)
+    assert not driven.rejected
+    assert driven.courses.limited == 1
+
+
+def test_a_stream_faster_than_its_clock_keeps_its_speed_and_reaches_its_goal(driven):
+    """A pose every 2 ms, stamped by a clock that ticks every 20 ms."""
+    heights = []
+    for k in range(1, 251):
+        driven.go_to(0.002 * k)
+        heights.append(driven.tool.position[2])
+        driven.take(pose(0.0002 * min(k, 200), 0.02 * (k // 10)))
+    assert not driven.rejected
+    assert driven.courses.alike > 200
+    assert np.diff(heights[100:200]) / 0.002 == pytest.approx([0.1] * 99, rel=0.15)
+    driven.go_to(0.55)
+    assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.04], abs=1e-6)
+
+
+def test_in_lockstep_the_first_of_one_stamp_counts(tmp_path):
+    """Whether time has gone on to that stamp when the second comes must not matter."""
+    driven = Driven(tmp_path, lockstep=True)
+    driven.take(pose(0.001, 0.1), pose(0.002, 0.1))
+    driven.go_to(0.1)
+    assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.001], abs=1e-6)
+    assert driven.rejected == {"out_of_order": 1}
+    assert driven.courses.alike == 0
 
 
 def test_a_delayed_stream_keeps_its_speed(driven):

@@ -41,6 +41,7 @@ class Diagnosis:
             "wall time of a step [us]": f"{1e6 * simulation.step_time:.4g}",
             "memory [MB]": f"{_resident_memory() / 1e6:.0f}",
             "commands slowed to max_speed": str(simulation.courses.limited),
+            "commands in place of one with the same stamp": str(simulation.courses.alike),
             "clouds dropped": str(dropped),
             "commands rejected": str(sum(rejected.values())),
             "last rejection": simulation.last_rejection,
