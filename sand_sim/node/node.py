@@ -261,7 +261,11 @@ class SandSimNode(LifecycleNode):
         self._publish_clock(observation)
         for tool in self._tools:
             tool.publish(observation)
+        self._publish_frames(observation)
+
+    def _publish_frames(self, observation: Observation) -> None:
         if self._frames:
+            self._frame_readers = self._frames.get_subscription_count()
             frames = [tool.frame(observation) for tool in self._tools if not tool.follows]
             self._frames.publish(tf2_msgs.frames_to_message(frames))
 
@@ -300,9 +304,16 @@ class SandSimNode(LifecycleNode):
         self._diagnosed = self._last
 
     def _repeat(self, observation: Observation) -> None:
-        """Tell the time and the bed again, but no frames or wrenches, of which each stamp is told once."""
+        """Tell again the time, the bed and where the tools are, but no wrenches, of which each stamp is told once.
+
+        Frames are told again only to new readers, because TF complains of each that it has heard already.
+        """
         if observation is self._last:
             self._publish_clock(observation)
+            for tool in self._tools:
+                tool.tell_pose(observation)
+            if self._frames and self._frames.get_subscription_count() != self._frame_readers:
+                self._publish_frames(observation)
             self._bed.tell(observation)
 
 

@@ -51,12 +51,16 @@ class ToolOutputs:
         """Tell all; called in the stepping thread once a frame."""
         time, report = observation.time, observation.tool(self._tool)
         self._publish_wrenches(report, time)
-        self._pose.publish(report_to_pose(report, time, self._parameters["frame_id"]))
+        self.tell_pose(observation)
         self._carried.publish(Float64(data=report.carried))
         self._swept.publish(Float64(data=report.swept))
         heard = self._contacts.get_subscription_count(), self._markers.get_subscription_count()
         if any(heard) and self._contacts_rate.due(time, self._parameters["contacts_rate"]):
             self._publish_contacts(self._world.tool_contacts(self._tool), time, *heard)
+
+    def tell_pose(self, observation: Observation) -> None:
+        """Tell where the tool is."""
+        self._pose.publish(report_to_pose(observation.tool(self._tool), observation.time, self._parameters["frame_id"]))
 
     def frame(self, observation: Observation) -> Frame:
         """Where the tool is, for TF."""

@@ -1,5 +1,6 @@
 """Nodes and clients for the tests of this folder."""
 
+import os
 import subprocess
 import sys
 import threading
@@ -29,7 +30,7 @@ def build_messages(tmp_path_factory):
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             assert done.returncode == 0, done.stderr
             patch.syspath_prepend(folder / "site")
-            patch.setenv("PYTHONPATH", str(folder / "site"))
+            patch.setenv("PYTHONPATH", str(folder / "site"), prepend=os.pathsep)
 
         yield build
 

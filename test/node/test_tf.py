@@ -61,3 +61,17 @@ def test_frames_of_tools_are_told(client, start_process, tf_message, tmp_path):
     (told,) = heard[-1].transforms
     assert (told.header.frame_id, told.child_frame_id) == ("world", "plate")
     assert told.transform.translation.z == pytest.approx(START[2] - 0.01, abs=1e-9)
+
+
+def test_whoever_comes_late_is_told_the_frames_once_though_nothing_moves(client, start_process, tf_message, tmp_path):
+    write_small_scene(tmp_path)
+    start_process(scene="small.yaml", pacing="lockstep")
+    client.connect()
+    client.wait_for(lambda: client.node.count_publishers("/tf") and len(client.diagnostics) > 1)
+    heard = []
+    client.node.create_subscription(tf_message, "/tf", heard.append, 100)
+    client.wait_for(lambda: heard)
+    assert heard[0].transforms[0].transform.translation.z == pytest.approx(START[2])
+    seen = len(client.diagnostics)
+    client.wait_for(lambda: len(client.diagnostics) > seen + 3)
+    assert len(heard) == 1, "TF complains of what it has heard already"

@@ -37,13 +37,16 @@ def hear(client, kind, topic, depth=100):
     return heard
 
 
-def test_whoever_comes_late_hears_the_time_and_the_bed_though_nothing_moves(client, start_node):
-    start_node(pacing="lockstep")
+@pytest.mark.parametrize("held", [{"pacing": "lockstep"}, {"pacing": "fast", "paused": True}])
+def test_whoever_comes_late_hears_the_time_the_bed_and_where_tools_are_though_nothing_moves(client, start_node, held):
+    start_node(**held)
     client.wait_for(lambda: client.clocks)
     clocks, clouds = hear(client, Clock, "/clock"), hear(client, PointCloud2, "/sand_sim/points")
-    frames = hear(client, WrenchStamped, f"{TOOL}/wrench")
-    client.wait_for(lambda: clocks and clouds)
+    frames, poses = hear(client, WrenchStamped, f"{TOOL}/wrench"), hear(client, PoseStamped, f"{TOOL}/pose_actual")
+    client.wait_for(lambda: clocks and clouds and poses)
     assert stamp_to_time(clocks[-1].clock) == 0.0
+    at = poses[-1].pose.position
+    assert [at.x, at.y, at.z] == pytest.approx(START)
     assert len(cloud_to_points(clouds[-1])) == 32
     assert not frames
 
