@@ -9,6 +9,10 @@ from sand_sim.urdf import shown
 _TYPES = {"pose": PoseStamped, "twist": TwistStamped}
 _NOT_YET_KNOWN, _NO_NODE = "_NODE_NAME_UNKNOWN_", "_CREATED_BY_BARE_DDS_APP_"
 _MOST_TOLD = 100
+_TWO_OF_A_NAME = (
+    "end one of them, or start it with -r __node:=second -p publish_clock:=false "
+    "(one that was killed stays known for some seconds)"
+)
 
 
 class GraphWatch:
@@ -30,11 +34,17 @@ class GraphWatch:
             for kind, message in _TYPES.items():
                 self._look_at_commands(tool, kind, f"{message.__module__.split('.')[0]}/msg/{message.__name__}")
         if self._parameters["publish_clock"]:
-            for publisher in self._publishers("/clock"):
-                if (publisher.node_name, publisher.node_namespace) != (self._node.get_name(), self._node.get_namespace()):
-                    self._tell(
-                        "/clock", publisher, "too; leave it out there (ros2 bag play --topics) or set publish_clock:=false"
-                    )
+            self._look_at_clocks()
+
+    def _look_at_clocks(self) -> None:
+        own = 0
+        for publisher in self._publishers("/clock"):
+            if (publisher.node_name, publisher.node_namespace) != (self._node.get_name(), self._node.get_namespace()):
+                self._tell("/clock", publisher, "too; leave it out there (ros2 bag play --topics) or set publish_clock:=false")
+                continue
+            own += 1
+            if own == 2:
+                self._tell("/clock", publisher, f"twice: there is another node of this name; {_TWO_OF_A_NAME}")
 
     def _look_at_commands(self, tool: str, kind: str, type_name: str) -> None:
         topic, source = self._node.resolve_topic_name(f"~/tools/{tool}/{kind}"), self._parameters[f"tools.{tool}.source"]

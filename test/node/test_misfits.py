@@ -63,6 +63,29 @@ def test_partners_that_do_not_fit_are_told_how_to_mend_it(client, stranger, star
     assert not any("'test_client' publishes" in message for message in heard)
 
 
+@pytest.mark.parametrize("namespace", ["/", "/elsewhere"])
+def test_a_forgotten_node_of_the_same_name(client, start_node, namespace):
+    """Its publishers look like our own, but for their number."""
+    heard, context = [], rclpy.Context()
+    client.node.create_subscription(Log, "/rosout", lambda log: heard.append(log.msg), LATCHED)
+    start_node(pacing="lockstep")
+    client.wait_for(lambda: len(client.diagnostics) > 2)
+    assert not any("publishes rosgraph_msgs/msg/Clock" in message for message in heard)
+    rclpy.init(context=context)
+    forgotten = rclpy.create_node("sand_sim", namespace=namespace, context=context)
+    try:
+        forgotten.create_publisher(Clock, "/clock", 1)
+        told = "/clock: 'sand_sim' publishes rosgraph_msgs/msg/Clock " + (
+            "twice: there is another node of this name; end one of them, or start it with -r __node:=second"
+            if namespace == "/"
+            else "too; leave it out there"
+        )
+        client.wait_for(lambda: any(told in message for message in heard))
+    finally:
+        forgotten.destroy_node()
+        rclpy.try_shutdown(context=context)
+
+
 def test_the_advice_on_quality_of_service_helps(client, start_node):
     node = start_node(pacing="lockstep", **{f"qos_overrides.{TOOL}/pose.subscription.reliability": "best_effort"})
     lossy = client.node.create_publisher(PoseStamped, f"{TOOL}/pose", LOSSY)
