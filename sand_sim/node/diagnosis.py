@@ -18,7 +18,7 @@ class Diagnosis:
 
     Args:
         simulation: that runs.
-        name: of the node.
+        name: of the node, with its namespace.
         warn: takes what there is to say of it once.
     """
 

@@ -228,7 +228,8 @@ class SandSimNode(LifecycleNode):
             self.get_logger().info("simulation_interfaces is not installed: its services are absent", once=True)
         else:
             SimulationServices(self, connections, services, self.simulation, inputs.frames, lambda: self._last)
-        self._diagnosis = Diagnosis(self.simulation, self.get_name(), self.get_logger().warning)
+        name = self.get_fully_qualified_name().lstrip("/")
+        self._diagnosis = Diagnosis(self.simulation, name, self.get_logger().warning)
         self._watch = GraphWatch(self, parameters, [tool.name for tool in world.scene.tools])
         connections.timer(_DIAGNOSTICS_PERIOD, self._diagnose)
 

@@ -13,6 +13,7 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 pytestmark = pytest.mark.xdist_group("processes")
 
 from node_client import PATIENCE, START, Client
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from scenes import write_small_scene
 from sensor_msgs.msg import PointCloud2
@@ -87,6 +88,27 @@ def test_two_nodes_under_two_names(client, start_node, tmp_path):
         client.send(START, at=0.1)
         client.wait_for(lambda: client.time == pytest.approx(0.1, abs=1e-4))
     finally:
+        second.destroy_node()
+
+
+def test_nodes_of_two_namespaces_are_told_apart_on_diagnostics(client, start_node, tmp_path):
+    start_node(pacing="lockstep")
+    (tmp_path / "second").mkdir()
+    overrides = {"scene": str(write_small_scene(tmp_path / "second")), "pacing": "lockstep", "publish_clock": False}
+    parameters = [Parameter(name, value=value) for name, value in overrides.items()]
+    second = SandSimNode(parameter_overrides=parameters, cli_args=["--ros-args", "-r", "__ns:=/robot"])
+    executor = SingleThreadedExecutor()
+    executor.add_node(second)
+    try:
+        second.start()
+
+        def names():
+            executor.spin_once(timeout_sec=0.0)
+            return {message.status[0].name for message in client.diagnostics}
+
+        client.wait_for(lambda: names() == {"sand_sim: world", "robot/sand_sim: world"})
+    finally:
+        executor.shutdown()
         second.destroy_node()
 
 
