@@ -10,48 +10,75 @@ from msg_adapters.builtin_interfaces import stamp_to_time
 from msg_adapters.geometry_msgs import command_to_pose
 from sand_sim.interruption import Interruption
 from sand_sim.playing import commands_at, frame_times
-from sand_sim.scene.types import Scene
+from sand_sim.scene.types import Scene, SceneError
 
 _AHEAD = 0.2  # [s] of simulated time by which poses are sent before they are due
-_FRAME_ID = "world"
 
 
-def play(scene: Scene, target: str, interruption: Interruption) -> int:
+def play(scene: Scene, target: str, frame_id: str, interruption: Interruption) -> int:
     """Send all poses of a scene's trajectories, stamped with simulated time.
 
     Args:
         scene: with trajectories.
         target: name of the node, which is waited for.
+        frame_id: frame that the poses are in; empty for the one in which the node tells where its tools are.
         interruption: the user's wish to stop.
 
     Returns:
-        Exit code: 0 when all has been played or the node has gone, 130 when interrupted.
+        Exit code: 0 when all has been played, 130 when interrupted.
+
+    Raises:
+        SceneError: if there is nothing to play, simulated time is past all of it, or the node has gone before the end.
     """
+    driven = [tool.name for tool in scene.tools if tool.trajectory]
+    if not driven:
+        raise SceneError(f"scene '{scene.name}' has no tool with a trajectory, so there is nothing to play")
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("sand_sim_player")
     try:
-        clock = [None]
+        clock, frame = [None], [frame_id]
 
         def hear(message: Clock) -> None:
             clock[0] = stamp_to_time(message.clock)
 
+        def hear_pose(message: PoseStamped) -> None:
+            frame[0] = frame[0] or message.header.frame_id
+
         node.create_subscription(Clock, "/clock", hear, 10)
-        topics = {tool.name: f"/{target}/tools/{tool.name}/pose" for tool in scene.tools if tool.trajectory}
-        publishers = {name: node.create_publisher(PoseStamped, topic, QoSProfile(depth=100)) for name, topic in topics.items()}
+        node.create_subscription(PoseStamped, f"/{target}/tools/{driven[0]}/pose_actual", hear_pose, 10)
+        publishers = {
+            name: node.create_publisher(PoseStamped, f"/{target}/tools/{name}/pose", QoSProfile(depth=100)) for name in driven
+        }
         times = frame_times(scene)
-        due, heard = next(times, None), False
+        due, begun = next(times, None), False
         while not interruption.asked:
             rclpy.spin_once(node, timeout_sec=0.05)
             # Matched, not only known: what is sent before that is lost, and the node would wait for it.
             present = all(publisher.get_subscription_count() for publisher in publishers.values())
-            heard = heard or (present and clock[0] is not None)
-            if heard and (not present or clock[0] > scene.duration - 0.5 / scene.frame_rate):
-                return 0
-            while heard and due is not None and due < clock[0] + _AHEAD:
+            if not begun:
+                begun = present and clock[0] is not None and bool(frame[0])
+                if not begun:
+                    continue
+                if clock[0] > scene.duration - 0.5 / scene.frame_rate:
+                    raise SceneError(_past(scene, target, clock[0]))
+            while due is not None and due < clock[0] + _AHEAD:
                 for command in commands_at(scene, due):
-                    publishers[command.tool].publish(command_to_pose(command, _FRAME_ID))
+                    publishers[command.tool].publish(command_to_pose(command, frame[0]))
                 due = next(times, None)
+            if clock[0] > scene.duration - 0.5 / scene.frame_rate or (due is None and not present):
+                return 0
+            if not present:
+                raise SceneError(
+                    f"node '{target}' has gone, or takes no poses any more, at {clock[0]:.2f} s of {scene.duration:g} s"
+                )
         return 130
     finally:
         node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _past(scene: Scene, target: str, now: float) -> str:
+    return (
+        f"nothing played: simulated time is {now:.2f} s, past the {scene.duration:g} s of scene '{scene.name}'; reset the node "
+        f"just before (ros2 service call /{target}/reset std_srvs/srv/Trigger), or let it wait with pacing:=lockstep"
+    )
