@@ -178,8 +178,12 @@ class Courses:
                 "they are counted from the first one, with stamps:=ignored any are taken for zero",
             )
         if command.time < course.last_stamp or (self.lockstep and command.time == course.last_stamp):
+            bound, anew = "must not be before", "send one without a stamp, which replaces all before it, or reset,"
+            if self.lockstep:
+                bound, anew = "must be later than", "reset"
             raise CommandError(
-                "out_of_order", f"{stamp} must be later than {course.last_stamp:.6f} s, the stamp before; reset to begin anew"
+                "out_of_order",
+                f"{stamp} {bound} {course.last_stamp:.6f} s, the stamp of the command before; {anew} to begin anew",
             )
         if self.lockstep and command.time <= now + 0.5 * self._world.time_step:
             raise CommandError("late", f"{stamp} must be later than simulated time {now:.6f} s in lockstep")

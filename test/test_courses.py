@@ -171,6 +171,22 @@ def test_in_lockstep_the_first_of_one_stamp_counts(tmp_path):
     assert driven.courses.alike == 0
 
 
+def test_after_a_stray_stamp_a_pose_without_one_begins_anew(driven, tmp_path):
+    driven.take(pose(0.0, 50.0), pose(0.01, 0.1))
+    assert driven.rejected == {"out_of_order": 1}
+    assert driven.messages[0].endswith("send one without a stamp, which replaces all before it, or reset, to begin anew")
+    driven.take(pose(0.0))
+    driven.take(pose(0.01, 0.1))
+    driven.go_to(0.1)
+    assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.01], abs=1e-6)
+    assert driven.rejected.total() == 1
+    lockstep = Driven(tmp_path, lockstep=True)
+    lockstep.take(pose(0.0, 50.0), pose(0.01, 0.1))
+    assert lockstep.messages[0].endswith("the stamp of the command before; reset to begin anew"), (
+        "where none may be without a stamp"
+    )
+
+
 def test_a_delayed_stream_keeps_its_speed(driven):
     """Poses measured every 20 ms that come in 50 ms late, and unevenly."""
     sent = 0
