@@ -48,8 +48,8 @@ def generate_launch_description() -> LaunchDescription:
 
 def start_node(context) -> list[LifecycleNode]:
     """The node, with the arguments that were given."""
-    values = {name: LaunchConfiguration(name).perform(context) for name in PARAMETERS}
-    given = {name: ParameterValue(value, value_type=PARAMETERS[name][1]) for name, value in values.items() if value}
+    asked = {name: LaunchConfiguration(name) for name in PARAMETERS}  # substitutions: launch turns no plain text into numbers
+    given = {name: ParameterValue(ask, value_type=PARAMETERS[name][1]) for name, ask in asked.items() if ask.perform(context)}
     node = LifecycleNode(
         package="sand_sim",
         executable="sand_sim_node",

@@ -24,6 +24,15 @@ class Noted:
         self.arguments, self.named = arguments, named
 
 
+class Value(Noted):
+    """Stands for ``ParameterValue``, which reads a type from a substitution, but takes nothing else that is not of that type."""
+
+    def __init__(self, value, *, value_type):
+        if not isinstance(value, value_type) and type(value).__name__ != "LaunchConfiguration":
+            raise TypeError(f"value='{value}' is not an instance of {value_type}")
+        super().__init__(value, value_type=value_type)
+
+
 @pytest.fixture
 def launch_file(monkeypatch):
     for module, names in {
@@ -37,7 +46,7 @@ def launch_file(monkeypatch):
     }.items():
         made = ModuleType(module)
         for name in names:
-            setattr(made, name, type(name, (Noted,), {}))
+            setattr(made, name, type(name, (Value if name == "ParameterValue" else Noted,), {}))
         monkeypatch.setitem(sys.modules, module, made)
     path = ROOT / "launch" / "sand_sim.launch.py"
     spec = importlib.util.spec_from_file_location("sand_sim_launch", path)
@@ -70,8 +79,10 @@ def test_launch_arguments_are_parameters_of_the_node(launch_file):
 
 
 def test_arguments_that_are_not_given_leave_the_parameter_file_alone(launch_file):
-    node, _ = started(launch_file, scene="hopper")
-    assert {name: value.arguments for name, value in node.named["parameters"][1].items()} == {"scene": ("hopper",)}
+    given = {"scene": "hopper", "real_time_factor": "2.0"}
+    node, _ = started(launch_file, **given)
+    asked = {name: value.arguments[0] for name, value in node.named["parameters"][1].items()}
+    assert {name: value.perform(given) for name, value in asked.items()} == given
 
 
 def test_parameter_file_names_parameters_with_their_defaults():
