@@ -94,8 +94,10 @@ def test_grains_come_and_go(client, start_node):
         assert not good
         assert reason in told
     assert not ask(client, "remove_grains")[0]
-    good, told = ask(client, "remove_grains", low=[0.0] * 6, high=[0.2, 0.2, 0.2])
-    assert (good, told) == (False, "argument 'low': must be x y z of 1, not 6 numbers")
+    for long in ("low", "high"):
+        box = {"low": [0.0] * 3, "high": [0.2] * 3}
+        told = ask(client, "remove_grains", **box | {long: 2 * box[long]})
+        assert told == (False, f"argument '{long}': must be x y z of 1, not 6 numbers")
     assert not ask(client, "remove_grains", id=[4000])[0]
     odd = SetParametersAtomically.Request(parameters=[ParameterMessage(name="radius", value=ParameterValue(type=200))])
     assert "there is no type 200" in client.call(SetParametersAtomically, "spawn_grains", odd).result.reason

@@ -4,6 +4,7 @@ import importlib.util
 import sys
 from pathlib import Path
 from types import ModuleType
+from xml.etree import ElementTree
 
 import pytest
 import yaml
@@ -70,7 +71,8 @@ def test_launch_arguments_are_parameters_of_the_node(launch_file):
     node, declared = started(launch_file, **dict.fromkeys(launch_file.PARAMETERS, "1"))
     assert all(entry["description"] for entry in declared.values())
     assert set(node.named["parameters"][1]) == set(launch_file.PARAMETERS) <= NAMES
-    assert float(node.named["sigterm_timeout"]) >= 30.0, "a second signal would end it before it has written its files"
+    for signal in ("sigterm", "sigkill"):
+        assert float(node.named[f"{signal}_timeout"]) >= 30.0, "a second signal would end it before it has written its files"
     assert Path(declared["params_file"]["default_value"]).is_file()
     defaults = {declaration.name: declaration.default for declaration in DECLARATIONS}
     for name, (text, kind) in launch_file.PARAMETERS.items():
@@ -83,6 +85,14 @@ def test_arguments_that_are_not_given_leave_the_parameter_file_alone(launch_file
     node, _ = started(launch_file, **given)
     asked = {name: value.arguments[0] for name, value in node.named["parameters"][1].items()}
     assert {name: value.perform(given) for name, value in asked.items()} == given
+
+
+def test_what_is_launched_is_a_dependency_of_the_package(launch_file):
+    (entries,) = launch_file.generate_launch_description().arguments
+    started = {entry.named["package"] for entry in entries if type(entry).__name__ == "Node"}
+    needed = {entry.text for entry in ElementTree.parse(ROOT / "package.xml").getroot().iter("exec_depend")}
+    assert started
+    assert {*started, "launch", "launch_ros"} <= needed
 
 
 def test_parameter_file_names_parameters_with_their_defaults():

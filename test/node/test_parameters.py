@@ -7,10 +7,13 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 pytestmark = pytest.mark.xdist_group("processes")
 
 from node_client import START
+from rcl_interfaces.msg import Log
 from rclpy.parameter import Parameter
-from rclpy.qos import ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from sand_sim.node.parameters import DECLARATIONS
+
+LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def set_one(node, name, value):
@@ -87,6 +90,17 @@ def test_quality_of_service_is_overridden_topic_by_topic(ros, start_node):
         assert other.qos_profile.reliability == ReliabilityPolicy.RELIABLE
 
 
-def test_parameters_that_nobody_declares_are_named(start_node):
-    node = start_node(pacing="lockstep", **{"scene_file": "hopper", "tools.plaet.source": "twist", "use_sim_time": False})
-    assert node.parameters.misspelt() == {"scene_file": "scene", "tools.plaet.source": "tools.plate.source"}
+def test_parameters_that_nobody_declares_are_named(client, start_node):
+    heard = []
+    client.node.create_subscription(Log, "/rosout", lambda log: heard.append(log.msg), LATCHED)
+    known = {"use_sim_time": False, "qos_overrides./sand_sim/points.publisher.reliability": "best_effort"}
+    gone = {"qos_overrides./sand_sim/tools/spade/wrench.publisher.reliability": "best_effort"}  # of another scene's tool
+    misspelt = {"scene_file": "hopper", "tools.plaet.source": "twist", "zzz": 1}
+    node = start_node(pacing="lockstep", **known, **gone, **misspelt)
+    assert node.parameters.misspelt() == {"scene_file": "scene", "tools.plaet.source": "tools.plate.source", "zzz": ""}
+    client.wait_for(lambda: any("is ready" in message for message in heard))
+    assert [message for message in heard if "there is no parameter" in message] == [
+        "there is no parameter 'scene_file'; is 'scene' meant?",
+        "there is no parameter 'tools.plaet.source'; is 'tools.plate.source' meant?",
+        "there is no parameter 'zzz'",
+    ]
