@@ -118,24 +118,17 @@ class Parameters(Mapping):
         self.declare(DECLARATIONS)
 
     def declare(self, declarations: tuple[Declaration, ...]) -> None:
-        """Declare some more, those that are declared already excepted.
+        """Declare some more; those that are declared already are only looked at again, as others may have changed.
 
         Raises:
-            ValueError: if an override is not allowed.
+            ValueError: if a value is not allowed.
         """
         for declaration in declarations:
-            if declaration.name in self._declarations:
-                continue
-            try:
-                self._node.declare_parameter(declaration.name, declaration.default, _descriptor(declaration))
-            except InvalidParameterTypeException as error:
-                hint = ", such as 10.0" if isinstance(declaration.default, float) else ""
-                kind = Parameter.Type.from_parameter_value(declaration.default).name.lower().replace("_", " ")
-                raise ValueError(f"parameter {declaration.name}: must be a {kind}{hint}; {error}") from None
-            self._declarations[declaration.name] = declaration
-            self._values[declaration.name] = self._node.get_parameter(declaration.name).value
-            if refusal := _refusal(declaration, self._values[declaration.name]) or self._clash(declaration.name):
-                raise ValueError(f"parameter {declaration.name}: {refusal}")
+            name = declaration.name
+            if name not in self._declarations:
+                self._declare(declaration)
+            if refusal := _refusal(declaration, self._values[name]) or self._clash(name):
+                raise ValueError(f"parameter {name}: {refusal}")
 
     def misspelt(self) -> dict[str, str]:
         """Parameters that were given but that nobody has declared, and the most similar of those declared, or ''."""
@@ -152,6 +145,16 @@ class Parameters(Mapping):
 
     def __len__(self) -> int:
         return len(self._values)
+
+    def _declare(self, declaration: Declaration) -> None:
+        try:
+            self._node.declare_parameter(declaration.name, declaration.default, _descriptor(declaration))
+        except InvalidParameterTypeException as error:
+            hint = ", such as 10.0" if isinstance(declaration.default, float) else ""
+            kind = Parameter.Type.from_parameter_value(declaration.default).name.lower().replace("_", " ")
+            raise ValueError(f"parameter {declaration.name}: must be a {kind}{hint}; {error}") from None
+        self._declarations[declaration.name] = declaration
+        self._values[declaration.name] = self._node.get_parameter(declaration.name).value
 
     def _clash(self, name: str) -> str:
         """Why a value does not fit to the others, empty if it does."""

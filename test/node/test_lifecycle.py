@@ -79,6 +79,21 @@ def test_impossible_transitions_are_refused(client, start_node):
     assert node.configured
 
 
+def test_frames_that_have_changed_are_looked_at_again(client, start_node):
+    node = start_node(pacing="lockstep")
+    for frame, tool in (("world", "world"), ("plate", "plate")):
+        if node.configured:
+            assert change(client, "deactivate")
+            assert change(client, "cleanup")
+        for name, value in (("frame_id", frame), ("tools.plate.frame", tool)):
+            assert node.set_parameters([Parameter(name, value=value)])[0].successful
+        assert not change(client, "configure")
+        told = f"parameter tools.plate.frame: '{tool}' is the world frame; give the tool a frame of its own"
+        assert str(node.failure) == told
+    assert node.set_parameters([Parameter("tools.plate.frame", value="spade")])[0].successful
+    assert change(client, "configure")
+
+
 def test_a_scene_that_cannot_be_leaves_the_node_unconfigured(client, start_node, tmp_path):
     node = start_node(autostart=False, pacing="lockstep")
     good = node.get_parameter("scene").value

@@ -146,8 +146,11 @@ def test_poses_in_fixed_frames(client, start_node):
         ({"frame_names": ["world"]}, "frames.world: frame 'world' in 'world': needs two different names"),
         ({"frame_names": ["base"], "frames.base.pose": [1.0]}, "frames.base.pose: must be 6 finite numbers"),
         ({"frame_id": "/map"}, "frame_id: must name a frame, without a '/' before it, not '/map'"),
+        ({"frame_id": ""}, "frame_id: must name a frame, without a '/' before it, not ''"),
         ({"tools.plate.frame": ""}, "tools.plate.frame: must name a frame"),
+        ({"tools.plate.frame": "/plate"}, "tools.plate.frame: must name a frame, without a '/' before it, not '/plate'"),
         ({"tools.plate.frame": "world"}, "tools.plate.frame: 'world' is the world frame; give the tool a frame of its own"),
+        ({"frame_id": "plate"}, "tools.plate.frame: 'plate' is the world frame; give the tool a frame of its own"),
         ({"tools.plate.source": "telepathy"}, "tools.plate.source: unknown 'telepathy'; known are pose, twist, tf"),
     ],
 )
