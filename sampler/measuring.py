@@ -7,7 +7,7 @@ from sampler.gaps import FAR, Gaps
 from sampler.lattice import lattice_spacing
 from sampler.skin import Skin
 
-_MEASURED = 100  # places per particle, over the area, and as many over the edges
+_MEASURED = 50  # places per particle, over the area, and as many over the edges
 _ENOUGH = 0.63  # particles nearer than this need no next one, in spacings
 _WIDER = 4.0  # where none is found, they are looked for so much farther
 _SURVEYED = 5000  # of the places that have none near, so many are asked where it is
