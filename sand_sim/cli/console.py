@@ -9,8 +9,8 @@ _EVERY = 5.0  # [s] between lines where lines cannot be written over
 class Console:
     """Shows where long work is."""
 
-    def __init__(self, stream=sys.stderr):
-        self._stream, self._shown, self._open = stream, 0.0, False
+    def __init__(self):
+        self._stream, self._shown, self._open = sys.stderr, 0.0, False  # that of now, not of the import
         self._stage = ""
 
     def stage(self, name: str, share: float) -> None:
