@@ -391,11 +391,3 @@ def test_a_sheet_beside_a_solid_weighs_what_its_thickness_says():
     assert body.volume == pytest.approx(1e-3 + 0.02 * 0.002, rel=1e-12)
     assert body.centre == pytest.approx([0.15 * 0.02 * 0.002 / body.volume, 0.0, 0.0], abs=1e-12)
     assert body.steps["sheets"] == 1
-
-
-@pytest.mark.parametrize("count", [20, 400])
-def test_few_particles_do_not_make_the_mass_of_crossing_parts_worse(count):
-    """A cylinder through a box: how finely triangles are cut must not depend on how many particles are wanted."""
-    box, cylinder = trimesh.creation.box((1.0, 0.8, 0.6)), trimesh.creation.cylinder(0.2, 2.0)
-    body = sample_body(trimesh.util.concatenate([box, cylinder]), radius=0.05, count=count)
-    assert body.volume == pytest.approx(box.volume + cylinder.volume * (1.0 - 0.6 / 2.0), rel=1e-9)

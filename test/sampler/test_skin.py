@@ -5,6 +5,7 @@ import pytest
 import trimesh
 from shapes import solid_angle_inside
 
+from sampler import sample_body
 from sampler.mass import integrate
 from sampler.rays import closing_cones
 from sampler.skin import Skin, free_triangles, touchable_parts, winding_before
@@ -180,3 +181,11 @@ def test_small_pieces_that_face_the_other_way_are_found(seed):
     below = points[normals[:, 2] < 0.0]
     away = np.linalg.norm(flags.mean(axis=1)[:, None] - below, axis=2).min(axis=1)
     assert away.max() < np.sqrt(2.0 / np.sqrt(3.0) / 400)
+
+
+@pytest.mark.parametrize("count", [20, 400])
+def test_few_particles_do_not_make_the_mass_of_crossing_parts_worse(count):
+    """A cylinder through a box: how finely triangles are cut must not depend on how many particles are wanted."""
+    box, cylinder = trimesh.creation.box((1.0, 0.8, 0.6)), trimesh.creation.cylinder(0.2, 2.0)
+    body = sample_body(trimesh.util.concatenate([box, cylinder]), radius=0.05, count=count)
+    assert body.volume == pytest.approx(box.volume + cylinder.volume * (1.0 - 0.6 / 2.0), rel=1e-9)
