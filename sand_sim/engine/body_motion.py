@@ -65,7 +65,7 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
     real, whole, vec3, vec4 = precision.real, precision.whole, precision.vec3, precision.vec4
     whole3, whole4, mat33 = precision.whole3, precision.whole4, precision.mat33
     gather_body, fetch_grain = build_gather_body(precision), build_fetch_grain(recipe)
-    add, carry = build_add(precision), recipe.carry
+    add = build_add(recipe)
     fetch_felt, fetch_place = build_prefetch(vec3), build_prefetch(whole4)
 
     @kernel
@@ -131,11 +131,7 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
                 if starting[0] != 0:
                     gain = half
                     turning -= half_push
-            if wp.static(carry):
-                velocity, kept = add(velocity, gain, motion_carry[b])
-                motion_carry[b] = kept
-            else:
-                velocity += gain
+            velocity = add(velocity, gain, motion_carry, b)
             now = velocity
             turning_now = turning
             if wp.static(verlet):

@@ -40,7 +40,7 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
         precision.whole3,
         precision.whole4,
     )
-    gather, add, carry = build_gather(recipe, walls, tools), build_add(precision), recipe.carry
+    gather, add = build_gather(recipe, walls, tools), build_add(recipe)
 
     @kernel
     def move_grains(
@@ -126,11 +126,7 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
                 velocity = half_motion[i]
                 if starting[0] != 0:
                     gain = half
-            if wp.static(carry):
-                velocity, left = add(velocity, gain, motion_carry[i])
-                motion_carry[i] = left
-            else:
-                velocity += gain
+            velocity = add(velocity, gain, motion_carry, i)
             if wp.static(verlet):
                 half_motion[i] = velocity
                 motion[i] = vec4(velocity[0] + half[0], velocity[1] + half[1], velocity[2] + half[2], old[3])
@@ -145,11 +141,7 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
                     spun = half_spin[i]
                     if starting[0] != 0:
                         gained = half_gained
-                if wp.static(carry):
-                    spun, spun_left = add(spun, gained, spin_carry[i])
-                    spin_carry[i] = spun_left
-                else:
-                    spun += gained
+                spun = add(spun, gained, spin_carry, i)
                 if wp.static(verlet):
                     half_spin[i] = spun
                     spun += half_gained
