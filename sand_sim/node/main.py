@@ -4,6 +4,10 @@ import sys
 
 from sand_sim.interruption import InterruptedByUserError, Interruption
 
+_USAGE = (
+    "usage: sand_sim_node --ros-args -p scene:=FILE [-p NAME:=VALUE ...] [--params-file FILE] [-r __node:=NAME] ...; "
+    "docs/node.md tells the parameters, and ros2 param describe those of a running node"
+)
 _SWITCH_INTERVAL = 5e-5  # [s] that Python's threads wait for each other; with the usual 5 ms stepping waits for messages
 
 
@@ -19,6 +23,7 @@ def main(arguments: list[str] | None = None) -> int:
     from rclpy.exceptions import ParameterException
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
     from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import remove_ros_args
 
     from sand_sim.node.node import SandSimNode
     from sand_sim.node.preparing import Preparation
@@ -34,6 +39,8 @@ def main(arguments: list[str] | None = None) -> int:
     executor, node = SingleThreadedExecutor(), None
     try:
         interruption.check()
+        if strange := remove_ros_args(sys.argv if arguments is None else arguments)[1:]:
+            return _explain(strange)
         node = SandSimNode(progress=Preparation(interruption.check, rclpy.logging.get_logger("sand_sim").info))
         executor.add_node(node)
         if node.parameters["autostart"]:
@@ -51,6 +58,15 @@ def main(arguments: list[str] | None = None) -> int:
             executor.shutdown()  # it holds on to what it waits for
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _explain(strange: list[str]) -> int:
+    """Say what arguments there are, instead of a run of the usual scene that nobody has asked for; the exit code."""
+    if {"-h", "--help"} & set(strange):
+        print(_USAGE)
+        return 0
+    print(f"sand_sim: unknown arguments '{' '.join(strange)}'; {_USAGE}", file=sys.stderr)
+    return 1
 
 
 def _spin(executor, node) -> None:

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -37,6 +39,22 @@ def test_bad_start_ends_with_one_line_and_code_1(start_process, tmp_path, parame
     assert process.returncode == 1
     assert named in errors
     assert len(errors.strip().splitlines()) == 1, errors
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "named"),
+    [
+        (["small.yaml"], 1, "unknown arguments 'small.yaml'; usage: sand_sim_node --ros-args -p scene:=FILE"),
+        (["-p", "scene:=small.yaml", "--ros-args", "-p", "pacing:=fast"], 1, "unknown arguments '-p scene:=small.yaml'"),
+        (["--help"], 0, "usage: sand_sim_node --ros-args -p scene:=FILE"),
+    ],
+)
+def test_arguments_that_are_not_for_ros_run_no_other_scene(words, code, named):
+    command = [sys.executable, "-m", "sand_sim.node", *words]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert done.returncode == code
+    told = done.stdout if code == 0 else done.stderr
+    assert named in told and len(told.splitlines()) == 1
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
