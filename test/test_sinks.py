@@ -76,6 +76,17 @@ def test_a_recording_holds_each_frame(world, tmp_path):
     assert is_sound(tmp_path / "run.rrd")
 
 
+@pytest.mark.parametrize("tools", [True, False])
+def test_a_bed_that_has_left_the_domain_leaves_all_files(tmp_path, tools):
+    pytest.importorskip("matplotlib")
+    world = World(load_scene(write_small_scene(tmp_path, **({} if tools else {"tools": {}}))))
+    recorder = Recorder(world, tmp_path / "out" / "run.rrd", tmp_path / "out")
+    world.remove_grains(box=([-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]))
+    frames(recorder, world, 2)
+    assert [path.name for path in recorder.close()] == ["run.rrd", "small.npz", "small.json", "small.png"]
+    assert not recorder.failed
+
+
 def test_a_full_disk_is_told_once_and_nothing_is_lost(world, tmp_path, monkeypatch):
     told = []
     recorder = Recorder(world, tmp_path / "run.rrd", report=told.append)

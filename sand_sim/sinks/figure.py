@@ -87,7 +87,8 @@ def _draw_view(axis, view: View, tools: list[ToolModel]) -> None:
     shown = np.flatnonzero(view.position[:, 1] > cut - view.radius)
     spots, depth = _project(view.position[shown])
     colours = colour_by_speed(view.speed[shown], 1.0) / 255.0
-    shade = 0.62 + 0.38 * np.clip(1.0 - (depth - depth.min()) / (np.ptp(depth) or 1.0), 0.0, 1.0)
+    nearest, farthest = (depth.min(), depth.max()) if len(depth) else (0.0, 0.0)
+    shade = 0.62 + 0.38 * np.clip(1.0 - (depth - nearest) / ((farthest - nearest) or 1.0), 0.0, 1.0)
     items = [(d, "grain", k) for k, d in enumerate(depth)]
     faces, face_colours = _tool_faces(view, tools, cut)
     items += [(d, "face", k) for k, (d, _) in enumerate(faces)]
@@ -112,11 +113,12 @@ def _draw_view(axis, view: View, tools: list[ToolModel]) -> None:
             colour, outlines = face_colours[run], [faces[k][1] for k in run]
             axis.add_collection(PolyCollection(outlines, facecolors=colour, edgecolors=colour, linewidths=0.4))
         start = end
-    corners = np.concatenate([spots, *(polygon for _, polygon in faces)]) if faces else spots
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    pad = 0.03 * float(np.max(high - low))
-    axis.set_xlim(low[0] - pad, high[0] + pad)
-    axis.set_ylim(low[1] - pad, high[1] + pad)
+    if items:
+        corners = np.concatenate([spots, *(polygon for _, polygon in faces)])
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        pad = 0.03 * float(np.max(high - low))
+        axis.set_xlim(low[0] - pad, high[0] + pad)
+        axis.set_ylim(low[1] - pad, high[1] + pad)
     axis.set_aspect("equal")
     axis.set_xlabel("x [m]", fontsize=8)
     axis.tick_params(labelsize=7)
