@@ -58,14 +58,12 @@ def is_sound(path):
     )
 
 
-def times_in(path):
-    """Moments that a recording holds grains of."""
-    printed = subprocess.run(
-        [sys.executable, "-m", "rerun", "rrd", "print", "-v", path], capture_output=True, text=True, check=True
-    ).stdout
-    return sum(
-        int(line.split(" with ")[1].split()[0]) for line in printed.splitlines() if "/world/grains" in line and " with " in line
-    )
+def times_in(path, timeline="sim_time"):
+    """Moments of a timeline that a recording holds grains of."""
+    command = [sys.executable, "-m", "rerun", "rrd", "print", "-vv", path]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    chunks = [chunk for chunk in printed.split("\nChunk(") if "/world/grains" in chunk and f" {timeline} " in chunk]
+    return sum(int(chunk.split(" with ")[1].split()[0]) for chunk in chunks)
 
 
 def test_a_recording_holds_each_frame(world, tmp_path):
@@ -73,6 +71,19 @@ def test_a_recording_holds_each_frame(world, tmp_path):
     frames(recorder, world, 7)
     assert recorder.close() == [tmp_path / "run.rrd"]
     assert times_in(tmp_path / "run.rrd") == 7 + 1, "and the radii, which are drawn once"
+    assert is_sound(tmp_path / "run.rrd")
+
+
+def test_what_comes_after_a_reset_is_not_mixed_with_what_was(world, tmp_path):
+    recorder = Recorder(world, tmp_path / "run.rrd")
+    frames(recorder, world, 4)
+    world.remove_grains(identity=[0])
+    frames(recorder, world, 3)
+    world.reset()
+    frames(recorder, world, 5)
+    recorder.close()
+    assert times_in(tmp_path / "run.rrd") == 7 + 2, "and the radii of all, and of one less"
+    assert times_in(tmp_path / "run.rrd", "sim_time_2") == 5 + 1
     assert is_sound(tmp_path / "run.rrd")
 
 

@@ -18,6 +18,9 @@ _AXES = "xyz"
 class Drawing:
     """Draws observations on a stream of Rerun.
 
+    Where time runs back, after a reset or when an earlier state is loaded, it goes on in a timeline of its own, ``sim_time_2``
+    and so on; in one of them Rerun would mix what is then with what has been.
+
     Args:
         world: that is drawn, its walls at once.
         stream: to draw on.
@@ -26,17 +29,23 @@ class Drawing:
 
     def __init__(self, world: World, stream: rr.RecordingStream, particles: bool = False):
         self._fastest = max((tool.max_speed for tool in world.scene.tools), default=1.0)
-        self._identity = np.zeros(0, int)
+        self._time, self._runs, self._timeline = 0.0, 1, _TIMELINE
         self._plungers = {wall.name for wall in world.assembly.walls if wall.drive}
         self._recording, self._world, self._particles = stream, world, particles
-        self._drawn: dict[str, ToolModel] = {}
+        self._draw_all_anew()
         stream.send_blueprint(_blueprint(world), make_active=False, make_default=True)
         self._draw_still(world)
 
     def write(self, observation: Observation) -> None:
         """Add one observation."""
         recording, grains, health = self._recording, observation.spheres, observation.health
-        recording.set_time(_TIMELINE, duration=observation.time)
+        if observation.time < self._time:
+            self._runs += 1
+            self._timeline = f"{_TIMELINE}_{self._runs}"
+            recording.reset_time()
+            self._draw_all_anew()
+        self._time = observation.time
+        recording.set_time(self._timeline, duration=observation.time)
         recording.log(
             "world/grains",
             rr.Points3D.from_fields(
@@ -71,6 +80,11 @@ class Drawing:
         }
         for name, value in shown.items():
             recording.log(f"health/{name}", rr.Scalars(value))
+
+    def _draw_all_anew(self) -> None:
+        """Draw also what has not changed next time."""
+        self._identity = np.zeros(0, int)
+        self._drawn: dict[str, ToolModel] = {}
 
     def _draw_still(self, world: World) -> None:
         """Draw what never changes: axes and walls."""
