@@ -13,7 +13,8 @@ In lockstep every command must carry a time, and times of one tool must rise. Ot
     time too far ahead             refused as ``future``: mostly a stamp of the wall clock
 
 After a gap a stream begins anew: its first pose is reached after the length of a gap. A velocity holds for a while only, so that
-a tool stops when whoever drives it is gone.
+a tool stops when whoever drives it is gone. Commands that were on their way when time was set back are forgotten as soon as one
+comes whose stamp can only be of the time after that.
 """
 
 from collections import deque
@@ -95,6 +96,11 @@ class Courses:
         """Forget all commands, after which time may begin anew."""
         self.by_tool = {tool.name: Course() for tool in self._world.scene.tools}
         self.shift: float | None = None
+        self._old_from: dict[str, float] = {}
+
+    def heed_late_ones(self, before: float) -> None:
+        """Expect commands that are still on their way with stamps of the time that has been left [s]."""
+        self._old_from = dict.fromkeys(self.by_tool, before - self.rules.oldest)
 
     @property
     def promised(self) -> float:
@@ -110,7 +116,12 @@ class Courses:
 
         Of those of one tool that replace each other only the last good one is carried out.
         """
-        good = [checked for command in commands if (checked := self._checked(command, reject))]
+        good: list[Command] = []
+        for command in commands:
+            if self._ends_late_ones(command):
+                good = [one for one in good if one.tool != command.tool]
+            if checked := self._checked(command, reject):
+                good.append(checked)
         last = {command.tool: k for k, command in enumerate(good) if not self._waits(command)}
         replaced: set[str] = set()
         # From the last to the first, so that one that cannot be carried out leaves its place to the one before.
@@ -140,6 +151,17 @@ class Courses:
             reject(error)
             return False
         return True
+
+    def _ends_late_ones(self, command: Command) -> bool:
+        """Whether it is the first of its tool that was surely meant for the time now, after others, which are forgotten here."""
+        old_from, tool = self._old_from.get(command.tool, -np.inf), command.tool
+        if command.time is None or not self._world.time - self.rules.oldest <= command.time < old_from:
+            return False
+        del self._old_from[tool]
+        late = self.by_tool[tool].last_stamp >= old_from
+        if late:
+            self.by_tool[tool] = Course()
+        return late
 
     def _checked(self, command: Command, reject: Callable[[CommandError], None]) -> Command | None:
         shift = self.shift

@@ -290,9 +290,11 @@ class Simulation:
         self._advance(self._frame_end)
 
     def _reset(self) -> None:
+        before = self.world.time
         self.world.reset()
         self.fault = None
         self.courses.clear()
+        self.courses.heed_late_ones(before)
         self._due = (0.0, 0.0)
         self._frame_end = self.world.time + self.frame
         self._on_frame(self.world.observe())
@@ -303,7 +305,9 @@ class Simulation:
 
     def _load(self, path: Path) -> float:
         self._writer.submit(bool).result()  # a state that is still being written may be the one that is asked for
+        before = self.world.time
         load_checkpoint(path, self.world, self._take_over)
+        self.courses.heed_late_ones(before)
         self._on_frame(self.world.observe())
         return self.world.time
 

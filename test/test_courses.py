@@ -187,6 +187,25 @@ def test_after_a_stray_stamp_a_pose_without_one_begins_anew(driven, tmp_path):
     )
 
 
+@pytest.mark.parametrize("together", [True, False])
+@pytest.mark.parametrize("late", [pose(0.01, 1.0), pose(0.01, 0.99), velocity((0.0, 0.0, 0.1), at=1.0)])
+@pytest.mark.parametrize("first", [0.02, 0.0])
+def test_what_was_on_its_way_at_a_reset_is_forgotten(driven, together, late, first):
+    driven.go_to(1.0)
+    driven.world.reset()
+    driven.courses.clear()
+    driven.courses.heed_late_ones(1.0)
+    for commands in [[late, pose(-0.002, first)]] if together else [[late], [pose(-0.002, first)]]:
+        driven.take(*commands)
+    driven.take(pose(-0.004, 0.04), pose(-0.006, 1.5))
+    driven.go_to(0.04)
+    assert driven.tool.position[2] == pytest.approx(START[2] - 0.004, abs=1e-9)
+    driven.go_to(1.5)
+    assert driven.tool.position[2] == pytest.approx(START[2] - 0.006, abs=1e-9)
+    driven.take(pose(0.0, 1.45))
+    assert driven.rejected == {"out_of_order": 1}, "as ever"
+
+
 def test_a_delayed_stream_keeps_its_speed(driven):
     """Poses measured every 20 ms that come in 50 ms late, and unevenly."""
     sent = 0

@@ -132,6 +132,24 @@ def test_reset_begins_anew(scene):
         assert np.array_equal(running.shown[-1].grains.position, first.grains.position)
 
 
+@pytest.mark.parametrize("loaded", [True, False])
+def test_poses_on_their_way_at_a_reset_hold_up_no_others(scene, tmp_path, loaded):
+    with Running(scene, "realtime") as running:
+        simulation = running.simulation
+        simulation.pause(True)
+        simulation.reset().result(30.0)
+        path = simulation.save_state(tmp_path / "begin.state").result(30.0)
+        for _ in range(40):
+            simulation.step().result(30.0)
+        (simulation.load_state(path) if loaded else simulation.reset()).result(30.0)
+        for position, at in ((START, 0.8), (START - [0.0, 0.0, 0.002], 0.02)):
+            simulation.submit(pose(position, at))
+            simulation.request(bool).result(30.0)  # so that they do not come together
+        simulation.step().result(30.0)
+        assert running.shown[-1].tools[0].position == pytest.approx(START - [0.0, 0.0, 0.002], abs=1e-9)
+        assert simulation.rejected == {}
+
+
 def test_real_time_follows_the_wall_clock(scene):
     with Running(scene, "realtime", real_time_factor=0.5) as running:
         running.wait_for(lambda shown: shown)
