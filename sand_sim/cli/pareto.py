@@ -14,6 +14,7 @@ from pathlib import Path
 import yaml
 
 from sand_sim.cli.console import Console
+from sand_sim.cli.numbers import count, positive
 from sand_sim.config_folder import find_scene
 from sand_sim.interruption import InterruptedByUserError, Interruption
 from sand_sim.scene.reading import load_scene
@@ -31,8 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", help="scene file, or the name of one of the package's own: impact, column and dig are ready")
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for NAME_pareto.json and NAME_pareto.png")
     defaults = ", ".join(f"{percent(value)} for {name}" for name, value in TOLERANCES.items()).replace("%", "%%")
-    parser.add_argument("--tolerance", type=_positive, help=f"largest relative error that will do, as 0.05 (default: {defaults})")
-    parser.add_argument("--repeats", type=_count, help="runs of each setting (default: 3, of one impact 8, with --quick 2)")
+    parser.add_argument("--tolerance", type=positive, help=f"largest relative error that will do, as 0.05 (default: {defaults})")
+    parser.add_argument("--repeats", type=count, help="runs of each setting (default: 3, of one impact 8, with --quick 2)")
     parser.add_argument("--write", type=Path, metavar="FILE", help="write the scene, else unchanged, with what is recommended")
     parser.add_argument("--quick", action="store_true", help="fewer settings, of a shorter run where the scene is one of ours")
     parser.add_argument("--quantity", choices=QUANTITIES, help="what is compared; chosen from the scene if left out")
@@ -44,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PATH=VALUE",
         help="change the scene before it is varied, as in --set duration=0.5 or --set 'fills.*.radius=0.004'; may be repeated",
     )
-    parser.add_argument("--threads", type=_count, help="cores to use; all if left out")
+    parser.add_argument("--threads", type=count, help="cores to use; all if left out")
 
 
 def execute(options: argparse.Namespace, interruption: Interruption) -> int:
@@ -146,17 +147,3 @@ def _edit(text: str) -> Edit:
     if not sign or not path or not value:
         raise argparse.ArgumentTypeError(f"must be PATH=VALUE, got '{text}'")
     return Edit(path, to(yaml.safe_load(value)))
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"must be positive, got {text}")
-    return value
-
-
-def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1, got {text}")
-    return value

@@ -9,6 +9,7 @@ from pathlib import Path
 from sand_sim.checkpoint import CheckpointError, take_checkpoint
 from sand_sim.checkpoints import PERIOD, CheckpointFolder
 from sand_sim.cli.console import Console
+from sand_sim.cli.numbers import count, positive
 from sand_sim.config_folder import find_scene
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.interruption import Interruption
@@ -24,8 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("scene", help="scene file, or the name of one of the package's own, such as dig")
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for recording, history, summary and figure")
-    parser.add_argument("--duration", type=float, help="simulated seconds; the scene's own if left out")
-    parser.add_argument("--threads", type=int, help="cores to use; all if left out")
+    parser.add_argument("--duration", type=positive, help="simulated seconds; the scene's own if left out")
+    parser.add_argument("--threads", type=count, help="cores to use; all if left out")
     parser.add_argument("--checkpoint", type=Path, metavar="FOLDER", help="keep the state there, so that a crash loses little")
     parser.add_argument("--checkpoint-period", type=float, default=PERIOD, metavar="S", help=f"wall seconds, default {PERIOD:g}")
     parser.add_argument("--resume", action="store_true", help="go on from the newest good checkpoint in that folder")

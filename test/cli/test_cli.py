@@ -58,6 +58,21 @@ def test_refusals_are_one_line(tmp_path):
     assert len(errors.strip().splitlines()) == 1
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--duration", "nan"], "argument --duration: must be positive, got nan"),
+        (["--duration", "inf"], "argument --duration: must be positive, got inf"),
+        (["--duration", "0"], "argument --duration: must be positive, got 0"),
+        (["--threads", "-3"], "argument --threads: must be at least 1, got -3"),
+    ],
+)
+def test_numbers_without_sense_are_refused(tmp_path, words, told):
+    code, _, errors = finish(sand_sim(tmp_path, "run", write_small_scene(tmp_path), *words))
+    assert code == 2
+    assert errors.strip().splitlines()[-1] == f"sand_sim run: error: {told}"
+
+
 def test_ctrl_c_keeps_what_was_recorded(tmp_path):
     process = sand_sim(tmp_path, "run", "dig", "--out", "results")
     begin = time.monotonic()
