@@ -1,5 +1,8 @@
 """A ROS client that drives the tools of a node along the trajectories of a scene, a little ahead of its clock."""
 
+import sys
+import time
+
 import rclpy
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
@@ -13,6 +16,7 @@ from sand_sim.playing import commands_at, frame_times
 from sand_sim.scene.types import Scene, SceneError
 
 _AHEAD = 0.2  # [s] of simulated time by which poses are sent before they are due
+_PATIENCE = 3.0  # [s] of waiting after which it is told what for
 
 
 def play(scene: Scene, target: str, frame_id: str, interruption: Interruption) -> int:
@@ -50,7 +54,7 @@ def play(scene: Scene, target: str, frame_id: str, interruption: Interruption) -
             name: node.create_publisher(PoseStamped, f"/{target}/tools/{name}/pose", QoSProfile(depth=100)) for name in driven
         }
         times = frame_times(scene)
-        due, begun = next(times, None), False
+        due, begun, told_at = next(times, None), False, time.monotonic() + _PATIENCE
         while not interruption.asked:
             rclpy.spin_once(node, timeout_sec=0.05)
             # Matched, not only known: what is sent before that is lost, and the node would wait for it.
@@ -58,6 +62,9 @@ def play(scene: Scene, target: str, frame_id: str, interruption: Interruption) -
             if not begun:
                 begun = present and clock[0] is not None and bool(frame[0])
                 if not begun:
+                    if time.monotonic() > told_at:
+                        told_at = float("inf")
+                        print(f"sand_sim: waiting for node '{target}': {_missing(target, publishers, clock[0])}", file=sys.stderr)
                     continue
                 if clock[0] > scene.duration - 0.5 / scene.frame_rate:
                     raise SceneError(_past(scene, target, clock[0]))
@@ -75,6 +82,13 @@ def play(scene: Scene, target: str, frame_id: str, interruption: Interruption) -
     finally:
         node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _missing(target: str, publishers: dict, now: float | None) -> str:
+    unheard = [name for name, publisher in publishers.items() if not publisher.get_subscription_count()]
+    if unheard:
+        return f"nobody hears /{target}/tools/{unheard[0]}/pose"
+    return "nobody tells the time on /clock" if now is None else "nobody tells where the tools are, in a frame"
 
 
 def _past(scene: Scene, target: str, now: float) -> str:

@@ -1,5 +1,6 @@
 """``sand_sim play``: a client of its own that says what became of it."""
 
+import signal
 import subprocess
 import sys
 
@@ -60,6 +61,21 @@ def test_poses_are_in_the_world_frame_of_the_node_or_the_one_that_is_asked_for(s
     (last,) = commands_at(scene, scene.duration)
     assert tool.position == pytest.approx(last.position + np.array([0.0, 0.0, 0.01 if asked else 0.0]), abs=1e-6)
     assert node.simulation.rejected == {}
+
+
+@pytest.mark.parametrize(
+    ("parameters", "target", "missing"),
+    [
+        ({}, "another", "node 'another': nobody hears /another/tools/plate/pose"),
+        ({"publish_clock": False}, "sand_sim", "node 'sand_sim': nobody tells the time on /clock"),
+    ],
+)
+def test_it_says_what_it_waits_for(start_node, play, parameters, target, missing):
+    start_node(pacing="lockstep", **parameters)
+    process = play("--node", target)
+    assert process.stderr.readline() == f"sand_sim: waiting for {missing}\n"
+    process.send_signal(signal.SIGINT)
+    assert finish(process) == (130, "")
 
 
 def test_it_is_left_alone_and_says_so(client, start_node, play):
