@@ -38,7 +38,9 @@ class Services:
 
     def _holding(self, paused: bool) -> Callable:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            refusal = self._node.refusal
+            refusal, fault = self._node.refusal, self._simulation.fault
+            if fault is not None and not paused:
+                refusal = refusal or f"stepping has stopped, reset to go on: {fault}"
             if not refusal:
                 self._pause(paused)
             response.success, response.message = not refusal, refusal or ("paused" if paused else "running")

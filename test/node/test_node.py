@@ -196,7 +196,9 @@ def test_a_run_that_blows_up_stops_and_comes_back(client, start_node):
     answer = client.call(Trigger, "step")
     assert not answer.success
     assert "blown up" in answer.message
-    assert client.call(Trigger, "resume").success
+    answer = client.call(Trigger, "resume")
+    assert not answer.success
+    assert answer.message.startswith("stepping has stopped, reset to go on: blown up")
     assert node.simulation.rejected["stopped"] == 1
     assert client.call(Trigger, "reset").success
     client.wait_for(lambda: client.time == 0.0)
