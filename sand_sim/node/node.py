@@ -164,6 +164,7 @@ class SandSimNode(LifecycleNode):
             scene = replace(scene, solver=replace(scene.solver, threads=parameters["threads"]))
         for tool in scene.tools:
             parameters.declare(tool_declarations(tool.name, tool.link))
+        parameters.check_frames([tool.name for tool in scene.tools])
         description, robot = read_robot(self, self._progress)
         scene = replace(scene, robot_description=description, mesh_roots=tuple(parameters["mesh_roots"]))
         world = World(scene, self._progress)

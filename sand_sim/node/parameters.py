@@ -130,6 +130,19 @@ class Parameters(Mapping):
             if refusal := _refusal(declaration, self._values[name]) or self._clash(name):
                 raise ValueError(f"parameter {name}: {refusal}")
 
+    def check_frames(self, tools: list[str]) -> None:
+        """See that no two tools, and no fixed frame and a tool, share a frame, which TF would show now here and now there.
+
+        Raises:
+            ValueError: if they do.
+        """
+        owners = dict.fromkeys(self._values["frame_names"], "a frame of frame_names")
+        for tool in tools:
+            frame = self._values[f"tools.{tool}.frame"]
+            if frame in owners:
+                raise ValueError(f"parameter tools.{tool}.frame: '{frame}' is {owners[frame]} already; give the tool its own")
+            owners[frame] = f"the frame of tool '{tool}'"
+
     def misspelt(self) -> dict[str, str]:
         """Parameters that were given but that nobody has declared, and the most similar of those declared, or ''."""
         known = [*self._values, *_OF_ROS]

@@ -1,6 +1,7 @@
 """Parameters: described, ranged, changeable where physics allows, refused with a reason elsewhere."""
 
 import pytest
+import yaml
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
@@ -10,6 +11,7 @@ from node_client import START
 from rcl_interfaces.msg import Log
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from scenes import write_small_scene
 
 from sand_sim.node.parameters import DECLARATIONS
 
@@ -78,6 +80,13 @@ def test_limits_on_stamps_change_while_it_runs(client, start_node):
     client.send(START, at=0.04)
     client.wait_for(lambda: client.time > 0.0399)
     assert node.simulation.rejected == {"future": 2}
+
+
+def test_two_tools_do_not_share_a_frame(ros, start_node, tmp_path):
+    plate = yaml.safe_load(write_small_scene(tmp_path).read_text())["tools"]["plate"]
+    blade = plate | {"trajectory": [{"time": 0.0, "position": [0.015, 0.015, 0.12]}]}
+    with pytest.raises(ValueError, match=r"parameter tools.plate.frame: 'edge' is the frame of tool 'blade' already"):
+        start_node({"tools": {"blade": blade, "plate": plate}}, **{"tools.blade.frame": "edge", "tools.plate.frame": "edge"})
 
 
 def test_quality_of_service_is_overridden_topic_by_topic(ros, start_node):

@@ -150,6 +150,7 @@ def test_poses_in_fixed_frames(client, start_node):
         ({"tools.plate.frame": ""}, "tools.plate.frame: must name a frame"),
         ({"tools.plate.frame": "/plate"}, "tools.plate.frame: must name a frame, without a '/' before it, not '/plate'"),
         ({"tools.plate.frame": "world"}, "tools.plate.frame: 'world' is the world frame; give the tool a frame of its own"),
+        ({"frame_names": ["plate"]}, "tools.plate.frame: 'plate' is a frame of frame_names already; give the tool its own"),
         ({"frame_id": "plate"}, "tools.plate.frame: 'plate' is the world frame; give the tool a frame of its own"),
         ({"tools.plate.source": "telepathy"}, "tools.plate.source: unknown 'telepathy'; known are pose, twist, tf"),
     ],
