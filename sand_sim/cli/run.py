@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from sand_sim.border import CommandError
 from sand_sim.checkpoint import CheckpointError, take_checkpoint
 from sand_sim.checkpoints import PERIOD, CheckpointFolder
 from sand_sim.cli.console import Console
@@ -66,11 +67,11 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         console.line(f"warning: {world.assembly.time_step.warning}", force=True)
     begin = world.time + 0.5 * world.time_step
     for time in (time for time in frame_times(scene, options.duration) if time > begin):
-        for command in commands_at(scene, time):
-            world.apply(command)
         try:
+            for command in commands_at(scene, time):
+                world.apply(command)
             world.step(round((time - world.time) / world.time_step))
-        except UnstableError as error:
+        except (CommandError, UnstableError) as error:
             recorder.log.fault = str(error)
             break
         recorder.write(world.observe())

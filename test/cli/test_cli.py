@@ -73,6 +73,16 @@ def test_numbers_without_sense_are_refused(tmp_path, words, told):
     assert errors.strip().splitlines()[-1] == f"sand_sim run: error: {told}"
 
 
+def test_a_trajectory_that_is_too_fast_ends_the_run_with_what_it_has(tmp_path):
+    scene = write_small_scene(tmp_path)
+    scene.write_text(scene.read_text().replace("max_speed: 1.0", "max_speed: 0.2"))
+    code, output, errors = finish(sand_sim(tmp_path, "run", scene, "--out", "results"))
+    assert code == 1
+    assert "Traceback" not in errors
+    assert errors.strip().splitlines()[-1].startswith("sand_sim: tool 'plate' would move at 0.265 m/s, its max_speed is 0.2 m/s")
+    assert "written: results/small.rrd" in output
+
+
 def test_ctrl_c_keeps_what_was_recorded(tmp_path):
     process = sand_sim(tmp_path, "run", "dig", "--out", "results")
     begin = time.monotonic()
