@@ -63,8 +63,9 @@ class ChangeServices:
         return self._simulation.load_state(self._state_file(name))
 
     def _state_file(self, name: str | None) -> Path:
-        name = self._world.scene.name if name is None else name
-        if not _NAME.fullmatch(name):
+        if name is None:
+            name = self._world.scene.name  # which may be that of a file
+        elif not _NAME.fullmatch(name):
             raise ArgumentError(f"argument 'name': '{name[:50]}' must be of letters, digits, '_', '-' and '.', and no path")
         return self._states / f"{name}.state"
 

@@ -103,7 +103,7 @@ def read_scene(parsed: dict, folder: Path) -> Scene:
         required=("materials", "pairs"),
     )
     scene = Scene(
-        name=top.optional("name", Field.text, "scene"),
+        name=top.optional("name", _file_name, "scene"),
         gravity=top.optional("gravity", Field.vector, (0.0, 0.0, -9.81)),
         domain=top.optional("domain", read_corners, None),
         materials=tuple(_material(name, entry) for name, entry in top["materials"].items()),
@@ -122,6 +122,13 @@ def read_scene(parsed: dict, folder: Path) -> Scene:
     )
     check_scene(scene)
     return scene
+
+
+def _file_name(entry: Field) -> str:
+    name = entry.text()
+    if "/" in name or name.startswith(".") or not name.isprintable():
+        raise entry.refuse(f"becomes the name of files: without '/' and not beginning with '.', got {name!r}")
+    return name
 
 
 def _material(name: str, entry: Field) -> Material:

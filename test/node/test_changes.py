@@ -66,6 +66,12 @@ def test_states_are_saved_and_loaded(client, start_node, tmp_path):
     assert node.simulation.fault is None
 
 
+def test_a_state_is_named_after_its_scene(client, start_node, tmp_path):
+    start_node({"name": "wet bed"}, pacing="lockstep", states=str(tmp_path / "states"))
+    assert ask(client, "save_state") == (True, str(tmp_path / "states" / "wet bed.state"))
+    assert ask(client, "load_state")[0]
+
+
 def test_grains_come_and_go(client, start_node):
     node = start_node(pacing="lockstep")
     client.connect()

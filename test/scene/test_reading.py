@@ -57,6 +57,8 @@ def test_good_scene_is_read():
         (("pairs", 0, "friction"), -0.1, "pairs[0].friction: must be at least 0, got -0.1"),
         (("pairs", 0, "restitution"), 0, "pairs[0].restitution: must be greater than 0"),
         (("pairs", 1), {"between": ["sand", "ice"], "restitution": 1, "friction": 1}, "pairs: unknown material 'ice'"),
+        (("name",), "beds/wet", "name: becomes the name of files: without '/' and not beginning with '.', got 'beds/wet'"),
+        (("name",), "..", "name: becomes the name of files"),
         (("pairs",), [GOOD["pairs"][0]], "pairs: no entry for 'sand' and 'steel'"),
         (("fills", 0, "radius"), -0.005, "fills[0].radius: must be greater than 0 [m]"),
         (("fills", 0, "radius"), {"uniform": [0.2, 0.1]}, "fills[0].radius: radii must be positive and in order"),
