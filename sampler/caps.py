@@ -31,13 +31,12 @@ def close_holes(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) 
 def boundary_loops(faces: np.ndarray, component: np.ndarray):
     """Yield the component and the vertex numbers of each boundary loop, in the direction in which a cap runs along it."""
     edges = edges_of(faces)
-    edge = np.repeat(np.arange(len(edges.ends)), edges.degree)
-    key = edge * (int(component.max()) + 1) + component[edges.face]
+    key = edges.edge * (int(component.max()) + 1) + component[edges.face]
     _, first, group = np.unique(key, return_index=True, return_inverse=True)
     net = np.bincount(group, np.where(edges.forward, 1, -1)).astype(int)
     follow: dict[tuple[int, int], list[int]] = {}
     for k in np.flatnonzero(net):
-        low, high = edges.ends[edge[first[k]]].tolist()
+        low, high = edges.ends[edges.edge[first[k]]].tolist()
         owner = int(component[edges.face[first[k]]])
         tail, head = (high, low) if net[k] > 0 else (low, high)
         follow.setdefault((owner, tail), []).extend([head] * abs(net[k]))

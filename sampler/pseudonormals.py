@@ -31,9 +31,8 @@ class Pseudonormals:
             angle = np.arctan2(np.linalg.norm(np.cross(p, q), axis=1), np.einsum("ij,ij->i", p, q))
             np.add.at(self._at_vertex, self._faces[:, k], angle[:, None] * self._normal)
         edges = edges_of(self._faces)
-        key = np.repeat(np.arange(len(edges.ends)), edges.degree)
         at_edge = np.zeros((len(edges.ends), 3))
-        np.add.at(at_edge, key, self._normal[edges.face])
+        np.add.at(at_edge, edges.edge, self._normal[edges.face])
         lookup = edges.ends[:, 0] * len(self._at_vertex) + edges.ends[:, 1]
         tail, head = self._faces, np.roll(self._faces, -1, axis=1)
         wanted = np.minimum(tail, head).astype(np.int64) * len(self._at_vertex) + np.maximum(tail, head)

@@ -141,7 +141,7 @@ def closing_cones(triangles: np.ndarray) -> np.ndarray:
     corners = triangles.reshape(-1, 3)
     _, first, vertex = np.unique(merge_points(corners, 0.0), return_index=True, return_inverse=True)
     edges = edges_of(vertex.reshape(-1, 3))
-    surplus = np.bincount(np.repeat(np.arange(len(edges.ends)), edges.degree), np.where(edges.forward, 1, -1)).astype(int)
+    surplus = np.bincount(edges.edge, np.where(edges.forward, 1, -1)).astype(int)
     surplus[edges.ends[:, 0] == edges.ends[:, 1]] = 0
     tail, head = _directed(*edges.ends.T, surplus)
     points, line = corners[first], link_items(len(first), tail, head)[0]

@@ -163,7 +163,7 @@ def _interfaces(faces: np.ndarray, opposed: np.ndarray) -> np.ndarray:
     if not opposed.any() or opposed.all():
         return np.zeros(len(faces), bool)
     edges = edges_of(faces)
-    edge = np.repeat(np.arange(len(edges.ends)), edges.degree)
+    edge = edges.edge
     own = np.bincount(edge, opposed[edges.face])
     others = edges.degree - own
     inner = np.flatnonzero(own == 2)

@@ -67,6 +67,11 @@ class Edges:
         return self.half // 3
 
     @cached_property
+    def edge(self) -> np.ndarray:
+        """Edge of each half-edge, its row in ``ends``."""
+        return np.repeat(np.arange(len(self.ends)), self.degree)
+
+    @cached_property
     def degree(self) -> np.ndarray:
         """Triangles at each edge, shape (edges,)."""
         return np.diff(self.start)
