@@ -1,5 +1,7 @@
 """Signed distance to a triangle mesh: the exact closest point on the triangles, the sign by generalized winding number."""
 
+from functools import cached_property
+
 import numpy as np
 import trimesh
 
@@ -32,7 +34,6 @@ class SignedDistance:
         self.device, self.thickness = device, thickness
         triangles, _ = closed_triangles(self.repaired, thickness)
         self.surface = Surface(triangles, device)
-        self._pseudonormals = Pseudonormals(triangles)
 
     def query(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Query points.
@@ -52,6 +53,11 @@ class SignedDistance:
         if len(near):
             inside[near] = self._inside_near(points[near], closest[near], face[near], inside[near])
         return np.where(inside, -distance, distance), closest, self.surface.normals[face]
+
+    @cached_property
+    def _pseudonormals(self) -> Pseudonormals:
+        """Made when the first point comes so near that they are asked for."""
+        return Pseudonormals(self.surface.triangles)
 
     def _inside_near(self, points, closest, face, inside):
         """Sign by pseudonormal (Baerentzen & Aanaes 2005) where the winding number is whole on both sides of the surface."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sampler.surface import Surface
 from sampler.topology import edges_of, merge_points
 
 _ON = 1e-9  # barycentric distance from an edge or corner that counts as on it
@@ -15,16 +16,9 @@ class Pseudonormals:
     """
 
     def __init__(self, triangles: np.ndarray):
-        self._triangles = triangles
-        self._built = False
-
-    def _build(self) -> None:
-        triangles = self._triangles
+        self._triangles, self._normal = triangles, Surface.normals_of(triangles)
         _, vertex = np.unique(merge_points(triangles.reshape(-1, 3), 0.0), return_inverse=True)
         self._faces = vertex.reshape(-1, 3)
-        normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        length = np.linalg.norm(normal, axis=1, keepdims=True)
-        self._normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0.0)
         self._at_vertex = np.zeros((int(vertex.max()) + 1, 3))
         for k in range(3):
             p, q = triangles[:, (k + 1) % 3] - triangles[:, k], triangles[:, (k + 2) % 3] - triangles[:, k]
@@ -37,7 +31,6 @@ class Pseudonormals:
         tail, head = self._faces, np.roll(self._faces, -1, axis=1)
         wanted = np.minimum(tail, head).astype(np.int64) * len(self._at_vertex) + np.maximum(tail, head)
         self._at_edge = at_edge[np.searchsorted(lookup, wanted)]
-        self._built = True
 
     def at(self, points: np.ndarray, face: np.ndarray) -> np.ndarray:
         """Pseudonormal of points on faces.
@@ -49,8 +42,6 @@ class Pseudonormals:
         Returns:
             Unit vectors, shape (n, 3).
         """
-        if not self._built:
-            self._build()
         corner = self._triangles[face]
         normal = self._normal[face].copy()
         for k in range(3):  # edges, then corners, the later winning

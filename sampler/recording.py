@@ -8,6 +8,7 @@ import trimesh
 from sampler.body import ParticleBody
 from sampler.distance import SignedDistance
 from sampler.errors import MeshError
+from sampler.surface import Surface
 
 _EVERY = 3  # moves of the particles between two pictures
 _SLICE = 200  # nodes along the longest edge of a slice
@@ -72,12 +73,10 @@ class Recording:
 
     def _mesh(self, triangles, colour):
         corners = triangles.reshape(-1, 3)
-        normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
         return self._rr.Mesh3D(
             vertex_positions=corners.astype(np.float32),
             triangle_indices=np.arange(len(corners)).reshape(-1, 3),
-            vertex_normals=np.repeat(normal, 3, axis=0).astype(np.float32),
+            vertex_normals=np.repeat(Surface.normals_of(triangles), 3, axis=0).astype(np.float32),
             albedo_factor=colour,
         )
 

@@ -61,9 +61,7 @@ def thicken(vertices: np.ndarray, faces: np.ndarray, thickness: float) -> tuple[
     corners = np.concatenate([corner[0], corner[1]])  # of front sides, then of back sides, in the order of the sheet's faces
     first, second = _common_corners(faces, a, b)
     joined, _, _ = link_items(6 * number, corners[a][first], corners[b][second])
-    triangles = vertices[faces]
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = Surface.normals_of(vertices[faces])
     normal = np.repeat(np.concatenate([normal, -normal]), 3, axis=0)
     offset = _corner_offsets(normal, joined)
     place = np.zeros((int(joined.max()) + 1, 3))
