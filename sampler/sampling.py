@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import trimesh
 
-from sampler.body import ParticleBody
+from sampler.body import Evenness, ParticleBody
 from sampler.errors import MeshError
 from sampler.inset import Inside, inset_triangles
 from sampler.lattice import lattice_spacing, particle_count
@@ -97,33 +97,21 @@ def sample_body(
         inside = Inside(_skin(free[: len(free) - len(plates)], solid, fine, device), solid)
         plates = touchable_parts(plates, solid, fine) if len(plates) else plates
         skin, settle = _inset_skin(inside, plates, radius, fine, count), None
-    area = float(skin.areas.sum())
-    for attempt in range(_TRIES):
-        number = count if count is not None else particle_count(area, fine)
-        if number > MOST:
-            raise too_many(area, number, radius)
-        h = lattice_spacing(area, number)
+
+    def spread(number: int, h: float) -> tuple[np.ndarray, np.ndarray]:
         beyond = beyond_rims(repaired.vertices, sheet, outer, h)
         move = partial(settle, spacing=h) if settle else lambda *placed: placed
         points, normals = spread_particles(skin, number, seed, progress, observe, move, beyond)
-        if inside:
-            points = inside.settle(points, radius, 0.2 * h)
-        evenness = measure_evenness(skin, points, normals)
-        h = lattice_spacing(area, len(points))
-        if grain is None or evenness.coverage * h < radius + grain:
-            break
-        if count is not None or attempt == _TRIES - 1:
-            raise MeshError(
-                f"a grain of radius {grain:.3g} m could pass: some places lie {evenness.coverage * h:.3g} m from the nearest "
-                f"particle of radius {radius:.3g} m; take more or larger particles"
-            )
-        fine *= _FINER
-    warnings += broken_limits(evenness, len(points), number, radius, solid.unit if solid else skin.unit)
+        return (inside.settle(points, radius, 0.2 * h) if inside else points), normals
+
+    area = float(skin.areas.sum())
+    points, normals, evenness, wanted = _spread_tight(spread, skin, radius, fine, count, grain)
+    warnings += broken_limits(evenness, len(points), wanted, radius, solid.unit if solid else skin.unit)
     return ParticleBody(
         points=points,
         normals=normals,
         radius=radius,
-        spacing=h,
+        spacing=lattice_spacing(area, len(points)),
         area=area,
         volume=volume,
         centre=centre,
@@ -134,6 +122,45 @@ def sample_body(
         steps=dict(repaired.report.steps),
         warnings=tuple(warnings),
     )
+
+
+def _spread_tight(
+    spread: Callable[[int, float], tuple[np.ndarray, np.ndarray]],
+    skin: Skin,
+    radius: float,
+    spacing: float,
+    count: int | None,
+    grain: float | None,
+) -> tuple[np.ndarray, np.ndarray, Evenness, int]:
+    """Spread particles, ever more of them until no grain can pass, unless their number is given.
+
+    Args:
+        spread: gives centres and normals for a number of particles and their spacing [m].
+        skin: where they lie.
+        radius: of the particles [m].
+        spacing: to begin with [m].
+        count: their number, if that is given.
+        grain: radius of the smallest grain that must not pass [m], if there is one.
+
+    Returns:
+        Centres, shape (n, 3) [m], and normals, shape (n, 3); how they lie; how many were wanted.
+    """
+    area = float(skin.areas.sum())
+    for attempt in range(_TRIES):
+        number = count if count is not None else particle_count(area, spacing)
+        if number > MOST:
+            raise too_many(area, number, radius)
+        points, normals = spread(number, lattice_spacing(area, number))
+        evenness = measure_evenness(skin, points, normals)
+        coverage = evenness.coverage * lattice_spacing(area, len(points))
+        if grain is None or coverage < radius + grain:
+            return points, normals, evenness, number
+        if count is not None or attempt == _TRIES - 1:
+            raise MeshError(
+                f"a grain of radius {grain:.3g} m could pass: some places lie {coverage:.3g} m from the nearest "
+                f"particle of radius {radius:.3g} m; take more or larger particles"
+            )
+        spacing *= _FINER
 
 
 def _skin(free: np.ndarray, solid: Surface | None, spacing: float, device: str) -> Skin:
