@@ -8,6 +8,7 @@ from sampler.errors import MeshError
 from sampler.obj import plain_obj
 
 _POINTER = b"version https://git-lfs"
+_SHOWN = 60  # letters of a line
 _STL_HEADER, _STL_TRIANGLE = 84, 50  # bytes
 _PLY_SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "float": 4, "double": 8}
 _PLY_SIZES |= {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "float32": 4, "float64": 8}
@@ -89,6 +90,9 @@ def _check_ply(name: str, data: bytes) -> None:
     ascii_file = any(line[:2] == ["format", "ascii"] for line in words)
     needed, number, rows = 0, 0, 0
     for line in words:
+        if line[:1] in (["element"], ["property"]) and (len(line) < 3 or (line[0] == "element" and not line[2].isdecimal())):
+            shown = " ".join(line)[:_SHOWN]
+            raise MeshError(f"mesh {name}: is corrupt: its header says '{shown}'; export it again")
         if line[:1] == ["element"]:
             number = int(line[2])
             rows += number

@@ -85,6 +85,14 @@ def test_files_cut_off_are_refused(tmp_path, kind, share):
         sample_body(read_mesh(path), radius=0.1)
 
 
+@pytest.mark.parametrize("line", ["element vertex", "element vertex many", "property", "property float"])
+def test_headers_of_ply_that_make_no_sense_are_refused(tmp_path, box, line):
+    head, end, body = box.export(file_type="ply").partition(b"end_header")
+    (tmp_path / "odd.ply").write_bytes(head + line.encode() + b"\n" + end + body)
+    with pytest.raises(MeshError, match=rf"mesh odd\.ply: is corrupt: its header says '{line}'"):
+        read_mesh(tmp_path / "odd.ply")
+
+
 def test_stl_with_bytes_to_spare_is_read(tmp_path, box):
     path = tmp_path / "spare.stl"
     path.write_bytes(box.export(file_type="stl") + b"made by a careless program")
