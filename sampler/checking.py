@@ -4,14 +4,16 @@ import re
 import struct
 from pathlib import Path
 
+import numpy as np
+
 from sampler.errors import MeshError
 from sampler.obj import plain_obj
+from sampler.strips import PLY_TYPES
 
 _POINTER = b"version https://git-lfs"
 _SHOWN = 60  # letters of a line
 _STL_HEADER, _STL_TRIANGLE = 84, 50  # bytes
-_PLY_SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4, "float": 4, "double": 8}
-_PLY_SIZES |= {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "float32": 4, "float64": 8}
+_PLY_SIZES = {name: np.dtype(kind).itemsize for name, kind in PLY_TYPES.items()}  # bytes
 
 
 def check_file(path: Path) -> None:

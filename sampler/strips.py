@@ -7,9 +7,9 @@ import trimesh
 
 from sampler.errors import MeshError
 
-_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4", "double": "f8"}
-_TYPES |= {"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"}
-_TYPES |= {"float32": "f4", "float64": "f8"}
+PLY_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4", "double": "f8"}
+PLY_TYPES |= {"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"}
+PLY_TYPES |= {"float32": "f4", "float64": "f8"}
 
 
 def read_strips(path: Path) -> trimesh.Trimesh | None:
@@ -52,7 +52,7 @@ def strip_triangles(strip: np.ndarray) -> np.ndarray:
     return faces[distinct]
 
 
-def _read_ascii(body, number, properties, strips, _, order):
+def _read_ascii(body, number, properties, strips, strip_properties, order):
     words = body.split()
     width = len(properties)
     names = [p[1] for p in properties]
@@ -66,10 +66,10 @@ def _read_ascii(body, number, properties, strips, _, order):
 
 
 def _read_binary(body, number, properties, strips, strip_properties, order):
-    row = np.dtype([(name, order + _TYPES[kind]) for kind, name in properties])
+    row = np.dtype([(name, order + PLY_TYPES[kind]) for kind, name in properties])
     table = np.frombuffer(body, row, number)
     _, length_type, item_type, _ = strip_properties[0]
-    length_type, item_type = np.dtype(order + _TYPES[length_type]), np.dtype(order + _TYPES[item_type])
+    length_type, item_type = np.dtype(order + PLY_TYPES[length_type]), np.dtype(order + PLY_TYPES[item_type])
     at, joined = number * row.itemsize, []
     for _ in range(strips):
         length = int(np.frombuffer(body, length_type, 1, at)[0])
