@@ -48,7 +48,6 @@ class RepairedMesh:
         vertices: shape (n, 3) [m].
         faces: outward, shape (m, 3).
         kind: of each face, ``SOLID``, ``CAP`` (closes a hole, not in the file) or ``SHEET``, shape (m,).
-        component: of each face, shape (m,).
         closed: all solids are closed, so that their winding numbers are whole.
         report: what was done.
     """
@@ -56,7 +55,6 @@ class RepairedMesh:
     vertices: np.ndarray
     faces: np.ndarray
     kind: np.ndarray
-    component: np.ndarray
     closed: bool
     report: RepairReport
 
@@ -121,7 +119,7 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
         faces, kind = _mend_pieces(vertices, faces, kind, piece, asked, report)
     large = Surface.areas_of(vertices[caps[keep & (corners > 3)]]).sum()
     _warn(report, float(large / area.sum()), int((keep & (corners > 3)).sum()), clashes)
-    return RepairedMesh(vertices, faces, kind, component, not enclosing, report)
+    return RepairedMesh(vertices, faces, kind, not enclosing, report)
 
 
 def _meet(vertices: np.ndarray, joined: np.ndarray) -> np.ndarray:
