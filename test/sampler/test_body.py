@@ -4,21 +4,10 @@ import numpy as np
 import pytest
 import trimesh
 from shapes import SOLIDS, THIN, robot_mesh, solid_angle_inside, wavy_ball, wedge
+from spread import distances, neighbours
 
 from sampler import MeshError, SignedDistance, make_field, read_mesh, repair_mesh, sample_body
 from sampler.mass import integrate
-
-
-def distances(a, b):
-    """From each point of a to the nearest of b, and which that is."""
-    found = [np.linalg.norm(part[:, None] - b[None], axis=2) for part in np.array_split(a, max(1, len(a) * len(b) // 3_000_000))]
-    return np.concatenate([f.min(axis=1) for f in found])
-
-
-def neighbours(points):
-    far = np.linalg.norm(points[:, None] - points[None], axis=2)
-    np.fill_diagonal(far, np.inf)
-    return far.min(axis=1)
 
 
 def surface_samples(mesh, number=20000):

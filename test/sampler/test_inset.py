@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from test_measuring import distances, worst_on_a_box
+from spread import distances, neighbours, worst_on_a_box
 
 from sampler import MeshError, sample_body
 from sampler.contour import contour_triangles
@@ -11,8 +11,8 @@ from sampler.surface import Surface
 
 
 def variation(points):
-    apart = np.linalg.norm(points[:, None] - points, axis=2) + np.diag(np.full(len(points), np.inf))
-    return apart.min(axis=1).std() / apart.min(axis=1).mean()
+    apart = neighbours(points)
+    return apart.std() / apart.mean()
 
 
 @pytest.mark.parametrize("count", [300, 1000])

@@ -3,33 +3,9 @@
 import numpy as np
 import pytest
 import trimesh
+from spread import distances, neighbours, worst_on_a_box
 
 from sampler import MeshError, sample_body
-
-
-def distances(places, points):
-    """From places to the nearest point."""
-    parts = np.array_split(places, 1 + len(places) * len(points) // 3_000_000)
-    return np.concatenate([np.linalg.norm(part[:, None] - points, axis=2).min(axis=1) for part in parts])
-
-
-def worst_on_a_box(extents, points, cells=80):
-    """Farthest place of a box from points: over a grid, then finer around the worst of its places."""
-    u = (np.arange(cells + 1) / cells - 0.5) * (1.0 - 1e-12)
-    worst = 0.0
-    for axis in range(3):
-        for side in (-1.0, 1.0):
-            place = np.stack(np.broadcast_arrays(side * 0.5, u[:, None], u[None, :]), axis=-1).reshape(-1, 3)
-            step = 1.0 / cells
-            for _ in range(4):
-                found = distances(np.roll(place, axis, axis=1) * extents, points)
-                best = place[np.argsort(-found)[:60]]
-                step /= 4.0
-                fine = step * (np.indices((9, 9)).reshape(2, -1).T - 4)
-                place = (best[:, None] + np.column_stack([np.zeros(81), fine])).reshape(-1, 3)
-                place = np.clip(place, -0.5, 0.5)
-            worst = max(worst, found.max())
-    return worst
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -49,8 +25,7 @@ def test_however_far_the_worst_place_is():
     worst = distances((along[:, None, None] * [1.0, 0.0, 0.0] + corners).reshape(-1, 3), body.points).max()
     assert worst > 2.0 * body.spacing
     assert body.coverage == pytest.approx(worst, rel=2e-3)
-    apart = np.linalg.norm(body.points[:, None] - body.points, axis=2) + np.diag(np.full(len(body), np.inf))
-    assert body.evenness.farthest * body.spacing == pytest.approx(apart.min(axis=1).max(), rel=1e-4)
+    assert body.evenness.farthest * body.spacing == pytest.approx(neighbours(body.points).max(), rel=1e-4)
     with pytest.raises(MeshError, match="could pass"):
         sample_body(bar, radius=15.0, count=50, grain=0.9 * worst - 15.0)
 

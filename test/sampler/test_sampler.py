@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from spread import distances, neighbours
 
 from sampler import MeshError, SignedDistance, locate_mesh, read_mesh, sample_body
 
@@ -13,16 +14,9 @@ MESHES = Path(__file__).parents[2] / "config" / "meshes"
 BUCKET = MESHES / "bucket.stl"
 
 
-def nearest_neighbours(points):
-    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
-    np.fill_diagonal(distance, np.inf)
-    return distance.min(axis=1)
-
-
 def farthest_from_particles(mesh, points, samples=4000):
     """Largest distance of surface points from the nearest particle."""
-    surface, _ = trimesh.sample.sample_surface(mesh, samples, seed=1)
-    return max(np.linalg.norm(part[:, None] - points[None], axis=2).min(axis=1).max() for part in np.array_split(surface, 20))
+    return distances(trimesh.sample.sample_surface(mesh, samples, seed=1)[0], points).max()
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +85,7 @@ def test_addresses_that_lead_nowhere_are_refused(address, reason):
     assert reason in str(caught.value)
 
 
-def test_distance_is_exact_and_negative_inside(sphere):
+def test_distance_is_exact_and_negative_inside():
     box = trimesh.creation.box((0.2, 0.1, 0.06))
     random = np.random.default_rng(0)
     points = random.uniform(-0.15, 0.15, (2000, 3))
@@ -106,7 +100,7 @@ def test_distance_is_exact_and_negative_inside(sphere):
 
 def test_particles_are_even_and_on_the_surface(sphere):
     body = sample_body(sphere, radius=0.004)
-    spacing = nearest_neighbours(body.points) / body.spacing
+    spacing = neighbours(body.points) / body.spacing
     assert np.abs(np.linalg.norm(body.points, axis=1) - 0.05).max() < 2e-4  # the mesh is a polyhedron
     assert spacing.std() / spacing.mean() < 0.06
     assert spacing.min() > 0.75
