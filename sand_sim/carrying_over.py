@@ -120,7 +120,7 @@ def fit(assembly: Assembly, loaded: Assembly, models: dict, state: dict[str, np.
         if path and key not in models:
             scene, tool = assembly.scene, tools[index].tool
             file = allowed_mesh(key[1], *mesh_roots(scene.mesh_roots, scene.folder))
-            model = model_tool(with_mesh(tool, str(file), key[2]), scene, _silent)
+            model = model_tool(with_mesh(tool, str(file), key[2]), scene)
             models[key] = replace(model, tool=with_mesh(tool, key[1], key[2]))
         tools[index] = models[key] if path else loaded.tools[index]
     reserve = float(state.get("lattice.reserve", assembly.lattice.reserve))
@@ -159,10 +159,6 @@ def _added_rows(assembly: Assembly, radius: np.ndarray, density: np.ndarray, mat
         raise ValueError("state: what it says of added grains ('added.*') makes no sense")
     middle, still = np.tile(assembly.lattice.centre, (len(radius), 1)), np.zeros((len(radius), 3))
     return GrainTable.of_spheres(middle, still, still.copy(), radius, density, material.astype(int))
-
-
-def _silent(stage: str, share: float) -> None:
-    """Nobody watches the progress."""
 
 
 def _particle_numbers(old, new, replaced: int | None) -> np.ndarray:

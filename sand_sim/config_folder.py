@@ -1,9 +1,8 @@
 """Where the package's own scenes and parameters are, from a source tree or installed."""
 
-import os
-import sys
 from pathlib import Path
 
+from sampler import package_prefixes
 from sand_sim.scene.types import SceneError
 
 _NAME = "sand_sim"
@@ -12,8 +11,7 @@ _NAME = "sand_sim"
 def config_folder() -> Path:
     """The folder with ``dig.yaml``: of the source tree if run from one, else the share folder of the installed package."""
     candidates = [Path(__file__).parent.parent / "config"]
-    prefixes = [*os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep), sys.prefix]
-    candidates += [Path(prefix) / "share" / _NAME / "config" for prefix in prefixes if prefix]
+    candidates += [prefix / "share" / _NAME / "config" for prefix in package_prefixes()]
     for folder in candidates:
         if (folder / "dig.yaml").is_file():
             return folder

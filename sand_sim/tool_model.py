@@ -80,7 +80,7 @@ def with_mesh(tool: Tool, mesh: str, scale: float) -> Tool:
     return replace(tool, mesh=mesh, scale=float(scale), urdf="", link="")
 
 
-def model_tool(tool: Tool, scene: Scene, progress: Progress) -> ToolModel:
+def model_tool(tool: Tool, scene: Scene, progress: Progress = lambda stage, share: None) -> ToolModel:
     """Sample a tool's mesh, so finely that no grain of the scene's fills passes between the particles it may touch.
 
     Args:

@@ -8,6 +8,7 @@ import numpy as np
 
 from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.types import Scene, SceneError
+from sand_sim.study.closed_forms import impact_overlap
 from sand_sim.study.sample import Sample
 from sand_sim.world import World
 
@@ -57,7 +58,7 @@ class Impact:
             raise SceneError("fills: the grain must move towards what it hits")
         values = {"rebound": np.array(restitution)}
         if restitution == 1.0:
-            overlap = (15.0 * mass * speed**2 / (16.0 * young * np.sqrt(radius))) ** 0.4
+            overlap = impact_overlap(mass, radius, young, speed)
             values["peak overlap"] = np.array(overlap)
             values["peak force"] = np.array(4.0 / 3.0 * young * np.sqrt(radius) * overlap**1.5)
             values["contact time"] = np.array(0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9) * overlap / speed)
