@@ -70,7 +70,7 @@ def texts_to_info(category: int, description: str, tags: list[str]):
     return info
 
 
-def names_to_features(names: list[str], custom_info: str):
+def names_to_features(names: tuple[str, ...], custom_info: str):
     """``SimulatorFeatures`` with those of the names that the installed version of the package knows."""
     numbers = [getattr(msg.SimulatorFeatures, name) for name in names if hasattr(msg.SimulatorFeatures, name)]
     return msg.SimulatorFeatures(features=numbers, custom_info=custom_info)

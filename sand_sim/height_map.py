@@ -40,6 +40,9 @@ def bed_grid(scene, cloud: GrainCloud, cell: float | None = None) -> tuple[np.nd
 
     Returns:
         Lower corner, shape (2,) [m], cell [m], rows and columns.
+
+    Raises:
+        ValueError: if there are neither fills with a region nor grains, or the cell is not positive.
     """
     corners = [np.asarray(corner, float)[:2] for fill in scene.fills if fill.low is not None for corner in (fill.low, fill.high)]
     if len(cloud):

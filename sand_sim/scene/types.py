@@ -185,7 +185,7 @@ class Tool:
     scale: float = 1.0  # [m per mesh unit]
     thickness: float | None = None  # [m] of sheets modelled as surfaces; None: two particle radii
     pose: Pose = Pose()
-    max_speed: float = 2.0  # [m/s] of any point of the tool; faster commands are rejected
+    max_speed: float = 2.0  # [m/s] of any point of the tool; World.apply rejects faster poses, the node slows them
     trajectory: tuple[Waypoint, ...] = ()
 
 

@@ -19,7 +19,7 @@ def draw_run(log: RunLog, tools: list[ToolModel], path: Path) -> None:
     """Draw a run into a PNG file.
 
     Args:
-        log: the run; one view is drawn at the end of each of its last named phases that differ most in time.
+        log: the run; a view is drawn of the end of its phases ``cut``, ``carry`` and ``dump``, else of its last three phases.
         tools: with their meshes.
         path: of the file; its folder is made.
     """

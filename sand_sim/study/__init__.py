@@ -1,1 +1,1 @@
-"""Error against run time: runs of a scene with its choices varied, compared with a reference."""
+"""Studies: error against run time with a scene's choices varied, and stability in stiff and extreme cases."""
