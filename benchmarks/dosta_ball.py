@@ -19,10 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.provenance import ROOT, provenance
+from benchmarks.provenance import provenance
 from sand_sim import Scene, SceneError, World, read_scene
 
-DATA = ROOT.parent / "shared/data/dosta"
 GRAINS, WALLS = "Penetration_25KParticles.txt", "Penetration_walls.txt"
 REPORTED = {20: -102.1, 25: -124.0, 30: -138.2}  # displacement of the ball [mm] at a time [ms]
 DEEPEST = -138.5  # [mm], codes differ by 1
@@ -135,7 +134,7 @@ def main(arguments: list[str] | None = None) -> int:
         0, or 1 where the data are missing.
     """
     parser = argparse.ArgumentParser(prog="dosta_ball", description=__doc__.split("\n", 1)[0])
-    parser.add_argument("--data", type=Path, default=DATA, help=f"folder with {GRAINS} and {WALLS} (default: %(default)s)")
+    parser.add_argument("--data", type=Path, required=True, help=f"folder with {GRAINS} and {WALLS}")
     parser.add_argument("--out", type=Path, help="folder for dosta_ball.png and dosta_ball.npz")
     parser.add_argument("--threads", type=int, help="cores to use; all if left out")
     options = parser.parse_args(arguments)

@@ -158,10 +158,9 @@ class _Client:
         self._poses = self._node.create_publisher(PoseStamped, "/sand_sim/tools/blade/pose", 100)
         self._clocks: list[tuple[float, float]] = []  # wall, simulated
         self._wrench = -1.0
-        self.clouds = 0
         self._node.create_subscription(Clock, "/clock", self._hear_clock, 5)
         self._node.create_subscription(WrenchStamped, "/sand_sim/tools/blade/wrench", self._hear_wrench, 5)
-        self._node.create_subscription(PointCloud2, "/sand_sim/points", self._hear_cloud, 5)
+        self._node.create_subscription(PointCloud2, "/sand_sim/points", lambda cloud: None, 5)  # heard, as in use
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
 
@@ -170,9 +169,6 @@ class _Client:
 
     def _hear_wrench(self, message) -> None:
         self._wrench = _seconds(message.header.stamp)
-
-    def _hear_cloud(self, message) -> None:
-        self.clouds += 1
 
     def connect(self) -> None:
         """Wait until the node hears us and we have heard it; it may need a push to say something."""

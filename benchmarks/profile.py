@@ -19,8 +19,8 @@ CYCLES, STEPS = 9, 2000
 PLAYS = {"listing": 10, "tool listing": 10, "step": 100}  # in one program
 
 
-def time_stages(world, cycles: int) -> dict[str, np.ndarray]:
-    """Seconds of each stage, once; shape (cycles,)."""
+def time_stages(world, cycles: int) -> dict[tuple[str, str], np.ndarray]:
+    """Seconds of each stage, by its group and name, once; shape (cycles,)."""
     solver = world.assembly.solver
     arrays, device, stages = solver.arrays, solver.device, solver.stages
     # Lists made anew so often are wider than those of a run, so that steps come first.

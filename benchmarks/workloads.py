@@ -44,11 +44,6 @@ class Workload:
             end = self.world.time + steps * self.world.time_step
             self.world.apply(ToolPose("blade", np.array([BLADE_SPEED * end, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]), end))
 
-    @property
-    def grains(self) -> int:
-        """Grains, each of them one sphere or one clump."""
-        return len(self.world.observe().grains)
-
     def figures(self) -> dict:
         """What shows that the work is the same: grains, spheres, contacts; and what speaks against the run."""
         observation, spheres = self.world.observe(), len(self.world.assembly.table)
