@@ -27,8 +27,8 @@ class CohesionLaw(Law):
 
     Attributes:
         reach: ``reach(pair, smaller radius, effective radius)`` gives the widest gap [m].
-        bond: ``bond(pair, smaller radius, effective radius)`` gives the energy that a bounce loses [J] and the largest pull [N];
-            zero where what touching gives parting takes.
+        bond: ``bond(pair, smaller radius, effective radius)`` gives the work of the bond [J] and the largest pull [N]; zero
+            without a bond.
     """
 
     reach: Callable[[PairNumbers, float, float], float] = lambda pair, least, radius: 0.0
@@ -160,6 +160,12 @@ def build_dmt_energy(precision: Precision, types: ContactTypes) -> wp.Function:
 def prepare_dmt(pair: PairNumbers) -> dict[str, float]:
     """Fields of the constant pull."""
     return {"adhesion_pull": 2.0 * np.pi * pair.given["adhesion"]}
+
+
+def dmt_bond(pair: PairNumbers, least: float, radius: float) -> tuple[float, float]:
+    """Work of the pull down to where the Hertz force balances it, ``(3 P/(4 E* sqrt(R*)))^(2/3)`` deep [J], and the pull [N]."""
+    pull = prepare_dmt(pair)["adhesion_pull"] * radius
+    return float(pull * (0.75 * pull / (pair.young * np.sqrt(radius))) ** (2.0 / 3.0)), float(pull)
 
 
 def build_two_thirds(precision: Precision) -> wp.Function:
@@ -306,6 +312,7 @@ COHESION_LAWS = {
         prepare=prepare_dmt,
         asks=("adhesion",),
         memory=(1,),
+        bond=dmt_bond,
     ),
     "jkr": CohesionLaw(
         build_jkr,

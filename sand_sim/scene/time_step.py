@@ -65,7 +65,8 @@ def parting_time(law: CohesionLaw, pair: PairNumbers, least: float, radius: floa
     W is the work of the bond and P its pull, hence ``W / P`` its range and ``sqrt(2 W / m*)`` that speed. Who parts more slowly
     is drawn back about as fast; who parts faster loses a lesser share. A pull sets in at full strength anywhere within a step, so
     the energy that a bounce loses is wrong by up to P times half the way of a step, in the mean by nothing. At 25 steps that is
-    2 % of the kinetic energy before a bounce at most, at any speed and with any volume of a liquid bridge.
+    2 % of the kinetic energy before a bounce at most, at any speed and with any volume of a liquid bridge; without a range, as
+    ``dmt``, of one that is no slower than W allows.
 
     Args:
         law: of cohesion.
