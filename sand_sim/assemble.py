@@ -28,7 +28,7 @@ from sand_sim.tool_model import Progress, ToolModel, model_tool
 
 _SKIN = 0.25  # of the mean grain radius
 _SPHERES_PER_THREAD = 1000
-_ROUNDED = 1e-3  # of the acceleration of gravity, that rounding may take off or add, before what it does is carried over
+_ROUNDED = 1e-3  # of the least acceleration to expect, that rounding may take off or add, before what it does is carried over
 _FLOOR = 0.05  # a plane whose normal points up by at least this much is a floor
 
 
@@ -258,8 +258,15 @@ def _fall_height(scene: Scene, table: GrainTable, walls: list[Wall], grounds: li
 
 
 def _loses_digits(scene: Scene, time_step: TimeStep, precision: Precision) -> bool:
-    """Whether rounding the fastest velocity to expect may change it by a notable share of what gravity does in a step."""
-    return 0.5 * precision.epsilon * time_step.speed > _ROUNDED * float(np.linalg.norm(scene.gravity)) * time_step.value > 0.0
+    """Whether rounding the fastest velocity to expect may change it by a notable share of the least that it gains in a step.
+
+    That is what gravity gives along an axis, or what friction or rolling resistance takes from a grain that it presses down.
+    """
+    gains, whole = [abs(along) for along in scene.gravity], float(np.linalg.norm(scene.gravity))
+    numbers = {"friction", "rolling_friction"}.intersection(scene.contact.asks)
+    gains += [rule.numbers[name] * whole for rule in scene.pairs for name in numbers]
+    least = min((gain for gain in gains if gain > 0.0), default=0.0)
+    return 0.5 * precision.epsilon * time_step.speed > _ROUNDED * least * time_step.value > 0.0
 
 
 def _pair_table(scene: Scene, order: list[str], precision: Precision) -> list[list]:
