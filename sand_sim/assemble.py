@@ -186,7 +186,7 @@ def build_solver(assembly: Assembly, setting: Setting, device, progress: Progres
         replace(setting, reach=_reach(scene, table, order)),
         assembly.lattice,
         table,
-        make_surfaces(assembly.walls, order, assembly.lattice, float(table.radius.min())),
+        make_surfaces(assembly.walls, order, assembly.lattice, float(table.radius.min()), assembly.plungers),
         [_tool_body(tool, order) for tool in assembly.tools]
         + [ToolBody(ground.body.points, ground.body.radius, order.index(ground.material)) for ground in assembly.grounds],
         assembly.pair_table,

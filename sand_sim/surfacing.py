@@ -24,7 +24,9 @@ def kinds_of(walls: list[Wall]) -> frozenset[str]:
     return frozenset(kinds)
 
 
-def make_surfaces(walls: list[Wall], order: list[str], lattice: Lattice, smallest: float) -> list[Surface]:
+def make_surfaces(
+    walls: list[Wall], order: list[str], lattice: Lattice, smallest: float, plungers: list[Plunger]
+) -> list[Surface]:
     """Surfaces in the order of the walls.
 
     Args:
@@ -32,17 +34,20 @@ def make_surfaces(walls: list[Wall], order: list[str], lattice: Lattice, smalles
         order: names of the materials.
         lattice: the domain.
         smallest: grain radius [m].
+        plungers: from ``make_plungers``.
 
     Raises:
         SceneError: if the virtual spheres of a rough wall are too many, or leave gaps for grains to fall through.
     """
-    surfaces, numbers, plungers = [], 0, 0
+    surfaces, numbers, moving = [], 0, 0
     for index, wall in enumerate(walls):
         surface = Surface()
         surface.kind = KINDS[wall.kind]
         surface.material = order.index(wall.material)
-        surface.plunger = plungers if wall.drive else -1
-        plungers += wall.drive is not None
+        surface.plunger = moving if wall.drive else -1
+        if wall.drive:
+            surface.ease = plungers[moving].pressed / plungers[moving].mass
+            moving += 1
         surface.first = numbers
         surface.anchor = np.rint((wall.point - lattice.centre) / lattice.quantum)
         surface.direction = wall.direction

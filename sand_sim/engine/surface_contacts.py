@@ -128,8 +128,8 @@ def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
 def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     """Kernel for the forces of surfaces on grains.
 
-    A surface is immovable for the law (m* is the grain's mass). A smooth one is flat there (R* is the grain's radius), also where
-    it is curved or ends in a rim; the spheres of a rough one are spheres.
+    A surface is immovable for the law (m* is the grain's mass) unless a force moves it. A smooth one is flat there (R* is the
+    grain's radius), also where it is curved or ends in a rim; the spheres of a rough one are spheres.
     """
     precision, rotation, materials, surfaces = recipe.precision, recipe.rotation, recipe.materials, recipe.surfaces
     real, vec3, vec4, whole4 = precision.real, precision.vec3, precision.vec4, precision.whole4
@@ -204,7 +204,9 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                 normal = vec3(real(way[0]), real(way[1]), real(way[2]))
                 of_i = motion[i]
                 of_wall = vec3(real(0.0))
+                mass = of_i[3]
                 if wp.static(moving):
+                    mass = mass / (real(1.0) + mass * real(wall.ease))
                     if wall.plunger >= 0:
                         along = vec3(real(wall.direction[0]), real(wall.direction[1]), real(wall.direction[2]))
                         of_wall = along * real(plungers[wall.plunger].seen)
@@ -214,7 +216,7 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     spin_i = spin[i]
                     turning = vec3(spin_i[0], spin_i[1], spin_i[2])
                     velocity -= wp.cross(turning, normal) * (radius - share * overlap)
-                met = meeting(normal, overlap, velocity, turning, law_radius, least, of_i[3])
+                met = meeting(normal, overlap, velocity, turning, law_radius, least, mass)
                 if wp.static(halves):
                     past = half_spin[i]
                     met = drifting(met, half_motion[i] - of_wall - wp.cross(past, normal) * (radius - share * overlap), past)

@@ -26,6 +26,7 @@ class Surface:
     kind: int
     material: int
     plunger: int  # index of the one that moves it, or -1
+    ease: wp.float64  # [1/kg] one over the mass that is moved by a force, zero if nothing moves it or at a velocity
     first: int  # its contacts are listed under partner numbers from here on
     anchor: wp.vec3d  # [quantum] a point of the plane, or height zero on the axis
     direction: wp.vec3d  # [1] the plane's normal towards the grains, or the axis

@@ -67,6 +67,33 @@ def test_elastic_grain_leaves_a_plunger_at_twice_its_velocity(make_world):
     assert world.observe().grains.velocity[0] == pytest.approx([0.0, 0.0, 2.0 * speed], rel=1e-3)
 
 
+def hit_free_plunger(make_world, restitution, ratio):
+    """A grain hits a plunger of ``ratio`` times its mass that no force drives; what is seen afterwards."""
+    radius, speed = 0.005, 0.5
+    mass = 2500.0 * 4 / 3 * np.pi * radius**3
+    world = make_world(
+        [[0.0, 0.0, 1.02 * radius]],
+        radius,
+        velocity=[0.0, 0.0, -speed],
+        restitution=restitution,
+        friction=0.0,
+        boundaries=[plunger(force=0.0, mass=ratio * mass, max_speed=2.0)],
+        domain=FREE,
+        threads=1,
+    )
+    world.step(round(0.002 / world.time_step))
+    return world.observe()
+
+
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 3.0])
+def test_restitution_of_a_plunger_as_light_as_a_grain(make_world, ratio):
+    """It yields, so that less mass is slowed down; momentum is shared."""
+    after = hit_free_plunger(make_world, 0.5, ratio)
+    grain, driven = after.grains.velocity[0, 2], after.wall("plunger").velocity[2]
+    assert grain - driven == pytest.approx(0.5 * 0.5, abs=0.005 * 0.5)
+    assert grain + ratio * driven == pytest.approx(-0.5, rel=1e-9)
+
+
 def bed(make_world, press, side=4, layers=4, **further):
     """Frictionless grains in a box under a plunger."""
     pitch = 0.0105
