@@ -111,6 +111,8 @@ def advance_plungers(
 ):
     """Sum the forces and move all plungers by one step, as the grains: ``w += a dt``, ``x += w dt``, ``v = w + a dt/2``.
 
+    The work of a force is that over half the step before and half the step after.
+
     Raises the flag ``moved`` if one has moved farther than half the skin [quantum] since the contact lists were made.
     """
     plungers = drives.shape[0]
@@ -124,6 +126,7 @@ def advance_plungers(
             total += blocks[block * plungers + k]
         state.force = total
         if engaged[0] != 0:
+            before = state.velocity * dt
             if drive.pressed != 0:
                 gained = (drive.force + total) / drive.mass * dt
                 state.velocity = wp.clamp(state.velocity + gained, -drive.max_speed, drive.max_speed)
@@ -134,7 +137,7 @@ def advance_plungers(
                 state.velocity = wp.float64(0.0)
                 state.seen = wp.float64(0.0)
             step = reached - state.offset
-            state.work = state.work - total * step
+            state.work = state.work - total * wp.float64(0.5) * (before + step)
             state.offset = reached
             state.shift = reached * inverse_quantum
             state.travelled = state.travelled + wp.abs(step)

@@ -94,6 +94,15 @@ def test_restitution_of_a_plunger_as_light_as_a_grain(make_world, ratio):
     assert grain + ratio * driven == pytest.approx(-0.5, rel=1e-9)
 
 
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 3.0])
+def test_work_of_a_plunger_that_is_pushed_back(make_world, ratio):
+    """Without damping, what it takes from the grain is what the grain loses."""
+    after = hit_free_plunger(make_world, 1.0, ratio)
+    before = 0.5 * float(after.grains.mass[0]) * 0.5**2
+    assert after.health.kinetic - after.health.tool_work == pytest.approx(before, rel=2e-3)
+    assert not after.health.doubts
+
+
 def bed(make_world, press, side=4, layers=4, **further):
     """Frictionless grains in a box under a plunger."""
     pitch = 0.0105
