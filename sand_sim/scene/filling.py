@@ -182,8 +182,11 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
         ("spin", ("wx", "wy", "wz")),
         ("orientation", ("qx", "qy", "qz", "qw")),
     ):
-        if all(name in names for name in wanted):
+        missing = [name for name in wanted if name not in names]
+        if not missing:
             columns[key] = column(*wanted)
+        elif len(missing) < len(wanted):
+            raise ValueError(f"of the columns {', '.join(wanted)} it lacks {', '.join(missing)}")
     if "radius" in names:
         columns["radius"] = column("radius")[:, 0]
     return columns

@@ -147,3 +147,10 @@ def test_unreadable_position_files_are_refused(tmp_path, name, content):
         (tmp_path / name).write_text(content)
     with pytest.raises(SceneError, match=name):
         fill_grains(Fill("bed", "sand", file=tmp_path / name), SAND, 0, [])
+
+
+def test_a_velocity_with_a_column_missing_is_refused(tmp_path):
+    """It would start at rest instead."""
+    (tmp_path / "grains.csv").write_text("x,y,z,radius,vx,vz\n0,0,0,0.005,1,2\n")
+    with pytest.raises(SceneError, match=r"grains\.csv.* lacks vy"):
+        fill_grains(Fill("bed", "sand", file=tmp_path / "grains.csv"), SAND, 0, [])
