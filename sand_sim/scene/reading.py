@@ -30,6 +30,7 @@ from sand_sim.scene.types import (
     SizeDistribution,
     Solver,
     Tool,
+    Vector,
     Waypoint,
 )
 
@@ -218,12 +219,13 @@ def _tool(name: str, entry: Field) -> Tool:
         raise entry["scale"].refuse("a URDF is in metres and scales its meshes itself; leave it out")
     if not (name.isidentifier() and name.isascii()):
         raise entry.refuse("a tool's name becomes part of its topics: letters of ASCII, digits and underscores only")
-    track = []
+    track, angles = [], None
     for stop in entry["trajectory"].entries() if "trajectory" in entry else []:
         stop.keys(("time", "phase", "position", "orientation", "rpy"), required=("time",))
         time = stop["time"].number(least=0.0, unit="s")
         if track and time <= track[-1].time:
             raise stop["time"].refuse(f"must be later than the waypoint before, at {track[-1].time:g} s")
+        angles = _turn_from(angles, stop["rpy"]) if "rpy" in stop else None
         pose = {key: stop.value[key] for key in ("position", "orientation", "rpy") if key in stop.value}
         track.append(Waypoint(time, read_pose(Field(pose, stop.path)), stop.optional("phase", Field.text, "")))
     initial = track[0].pose if track and "pose" not in entry else Pose()
@@ -242,6 +244,17 @@ def _tool(name: str, entry: Field) -> Tool:
         max_speed=entry.optional("max_speed", lambda f: f.number(above=0.0, most=1e4, unit="m/s"), 2.0),
         trajectory=tuple(track),
     )
+
+
+def _turn_from(before: Vector | None, rpy: Field) -> Vector:
+    """Angles of a waypoint [rad], to which a tool must not have to turn by half a turn: it goes the shorter way round."""
+    angles = rpy.vector()
+    if before and max(abs(a - b) for a, b in zip(angles, before, strict=True)) >= math.pi:
+        raise rpy.refuse(
+            f"is half a turn or more from {list(before)} [rad] at the waypoint before, but tools turn the shorter way round; put "
+            "waypoints in between, or if that way is meant, add 2 pi to an angle or take it away"
+        )
+    return angles
 
 
 def _contact(entry: Field) -> ContactModel:

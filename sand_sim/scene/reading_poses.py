@@ -10,6 +10,8 @@ def read_pose(entry: Field) -> Pose:
     entry.keys(("position", "orientation", "rpy"))
     position = entry.optional("position", Field.vector, (0.0, 0.0, 0.0))
     if "rpy" in entry:
+        if "orientation" in entry:
+            raise entry.refuse("give only one of 'orientation' and 'rpy'")
         return Pose(position, tuple(map(float, rotation.from_rpy(*entry["rpy"].vector()))))
     if "orientation" not in entry:
         return Pose(position)

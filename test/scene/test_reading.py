@@ -76,6 +76,16 @@ def test_good_scene_is_read():
             "tools.spade.pose.orientation: must not be the zero quaternion",
         ),
         (("tools", "spade", "trajectory"), [{"time": 1}, {"time": 1}], "tools.spade.trajectory[1].time: must be later"),
+        (
+            ("tools", "spade", "trajectory"),
+            [{"time": 0, "rpy": [0, 0, 0]}, {"time": 1, "rpy": [0, 6.2832, 0]}],
+            "tools.spade.trajectory[1].rpy: is half a turn or more from [0.0, 0.0, 0.0] [rad] at the waypoint before",
+        ),
+        (
+            ("tools", "spade", "pose"),
+            {"orientation": [0, 0, 0, 1], "rpy": [0, 1, 0]},
+            "tools.spade.pose: give only one of 'orientation' and 'rpy'",
+        ),
         (("tools", "my spade"), GOOD["tools"]["spade"], "tools.my spade: a tool's name becomes part of its topics"),
         (("tools", "sch\u00fcrfe"), GOOD["tools"]["spade"], "a tool's name becomes part of its topics"),
         (("contact",), {"normal": "hertzz"}, "contact.normal: unknown 'hertzz'; known are"),
