@@ -156,7 +156,9 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
             z = at[2] + whole(jump[2])
             if wp.abs(x) > half_extent[0] or wp.abs(y) > half_extent[1] or wp.abs(z) > half_extent[2]:
                 height = -wp.dot(gravity, vec3(real(x), real(y), real(z)) * quantum)
-                wp.atomic_add(carried_off, lane, wp.float64(old[3] * (real(0.5) * wp.dot(now, now) + height)))
+                spinning = spin_of(wp.quat_to_matrix(turn[b]), turning_now, ease_of(inertia[b]))
+                energy = wp.float64(old[3] * (real(0.5) * wp.dot(now, now) + height))
+                wp.atomic_add(carried_off, lane, energy + wp.float64(0.5) * wp.dot(spinning, turning_now))
                 body_place[b] = whole4(parking, parking, parking, whole(0))
                 for m in range(first, last):
                     place[sphere_at[m]] = whole4(parking, parking, parking, whole(0))

@@ -165,6 +165,9 @@ def build_move_grains(recipe: Recipe, walls: bool, tools: bool) -> wp.Kernel:
                 now = motion[i]
                 height = -wp.dot(gravity, vec3(real(x), real(y), real(z)) * quantum)
                 energy = now[3] * (real(0.5) * (now[0] * now[0] + now[1] * now[1] + now[2] * now[2]) + height)
+                if wp.static(rotation):
+                    now = spin[i]
+                    energy += real(0.5) * now[3] * (now[0] * now[0] + now[1] * now[1] + now[2] * now[2])
                 wp.atomic_add(carried_off, lane, wp.float64(energy))
                 place[i] = whole4(parking, parking, parking, whole(0))
                 grains_moved[0] = 1

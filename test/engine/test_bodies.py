@@ -229,7 +229,7 @@ def test_body_that_leaves_is_retired_whole(make_bodies):
     spheres = [[0.0, 0.0, 0.0, 0.01], [0.03, 0.0, 0.0, 0.01]]
     world = make_bodies(
         {
-            "lost": {"spheres": spheres, "velocity": [5.0, 0.0, 0.0]},
+            "lost": {"spheres": spheres, "velocity": [5.0, 0.0, 0.0], "spin": [10.0, 20.0, 30.0]},
             "kept": {"spheres": spheres, "pose": {"position": [0, 0.5, 0]}},
         }
     )

@@ -98,9 +98,9 @@ def test_grains_that_leave_are_counted_and_retired(make_world):
 
 
 def test_grains_that_fall_out_take_their_energy_along(make_world):
-    """Height and motion are those of the same moment; one step apart they would differ by ``m g v dt``."""
-    domain = {"low": [-0.05] * 3, "high": [0.05] * 3}
-    world = make_world([[0.0, 0.0, 0.0]], 0.002, gravity=[0.0, 0.0, -9.81], domain=domain, precision="double")
+    """Height, motion and spin are those of the same moment; one step apart they would differ by ``m g v dt``."""
+    domain, spin = {"low": [-0.05] * 3, "high": [0.05] * 3}, [30.0, 0.0, 50.0]
+    world = make_world([[0.0, 0.0, 0.0]], 0.002, spin=spin, gravity=[0.0, 0.0, -9.81], domain=domain, precision="double")
     world.step(round(0.15 / world.time_step))
     health = world.observe().health
     assert health.retired == 1
