@@ -28,7 +28,9 @@ from sand_sim.tool_model import Progress, ToolModel, model_tool
 
 _SKIN = 0.25  # of the mean grain radius
 _SPHERES_PER_THREAD = 1000
-_ROUNDED = 1e-3  # of the least acceleration to expect, that rounding may take off or add, before what it does is carried over
+_ROUNDED = 1e-3  # of what gravity gives, that rounding may take off or add, before what it does is carried over
+_RESISTED = 5e-3  # the same of what friction or rolling resistance takes
+_LEVEL = 1e-6  # of gravity: less of it along an axis is none
 _FLOOR = 0.05  # a plane whose normal points up by at least this much is a floor
 
 
@@ -262,11 +264,12 @@ def _loses_digits(scene: Scene, time_step: TimeStep, precision: Precision) -> bo
 
     That is what gravity gives along an axis, or what friction or rolling resistance takes from a grain that it presses down.
     """
-    gains, whole = [abs(along) for along in scene.gravity], float(np.linalg.norm(scene.gravity))
+    whole = float(np.linalg.norm(scene.gravity))
+    allowed = [_ROUNDED * abs(along) for along in scene.gravity if abs(along) > _LEVEL * whole]
     numbers = {"friction", "rolling_friction"}.intersection(scene.contact.asks)
-    gains += [rule.numbers[name] * whole for rule in scene.pairs for name in numbers]
-    least = min((gain for gain in gains if gain > 0.0), default=0.0)
-    return 0.5 * precision.epsilon * time_step.speed > _ROUNDED * least * time_step.value > 0.0
+    allowed += [_RESISTED * rule.numbers[name] * whole for rule in scene.pairs for name in numbers]
+    least = min((share for share in allowed if share > 0.0), default=np.inf)
+    return 0.5 * precision.epsilon * time_step.speed > least * time_step.value
 
 
 def _pair_table(scene: Scene, order: list[str], precision: Precision) -> list[list]:
