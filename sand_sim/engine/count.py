@@ -38,6 +38,12 @@ def share_start(number: int, own: int, shares: int) -> int:
 
 
 @wp.func
+def part_start(number: int, own: int, parts: int) -> int:
+    """First item of one of so many parts that are as equal as can be; a product of 32 bits would be too small on a large GPU."""
+    return int(wp.int64(number) * wp.int64(own) // wp.int64(parts))
+
+
+@wp.func
 def share_out(spans: wp.array(dtype=int), number: int):
     """Device side of ``Count.set``."""
     for lane in range(spans.shape[0]):

@@ -4,7 +4,7 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.engine.count import count_of
+from sand_sim.engine.count import count_of, part_start
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.recipe import Recipe
 from sand_sim.integrator import VERLET
@@ -44,7 +44,7 @@ def build_grain_energy(recipe: Recipe) -> wp.Kernel:
         grains = count_of(spans)
         number = (grains + wp.static(BLOCK) - 1) // wp.static(BLOCK)
         top = real(0.0)
-        for block in range(number * own // shares, number * (own + 1) // shares):
+        for block in range(part_start(number, own, shares), part_start(number, own + 1, shares)):
             total = wp.vec3d(wp.float64(0.0))
             first = block * wp.static(BLOCK)
             for i in range(first, wp.min(first + wp.static(BLOCK), grains)):
@@ -122,7 +122,7 @@ def build_contact_energy(precision: Precision) -> wp.Kernel:
         own = lane + wp.tid()
         contacts = count_of(spans)
         number = (contacts + wp.static(BLOCK) - 1) // wp.static(BLOCK)
-        for block in range(number * own // shares, number * (own + 1) // shares):
+        for block in range(part_start(number, own, shares), part_start(number, own + 1, shares)):
             total = wp.vec2d(wp.float64(0.0))
             first = block * wp.static(BLOCK)
             for contact in range(first, wp.min(first + wp.static(BLOCK), contacts)):

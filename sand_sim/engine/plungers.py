@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
-from sand_sim.engine.count import count_of
+from sand_sim.engine.count import count_of, part_start
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.surfaces import Surface, build_surface_of
@@ -82,7 +82,7 @@ def build_plunger_blocks(recipe: Recipe) -> wp.Kernel:
         own = lane + wp.tid()
         pairs = count_of(pair_spans)
         number = (pairs + wp.static(SUM_BLOCK) - 1) // wp.static(SUM_BLOCK)
-        for block in range(number * own // shares, number * (own + 1) // shares):
+        for block in range(part_start(number, own, shares), part_start(number, own + 1, shares)):
             for plunger in range(plungers):
                 blocks[block * plungers + plunger] = wp.float64(0.0)
             first = block * wp.static(SUM_BLOCK)

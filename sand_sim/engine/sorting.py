@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from sand_sim.engine.count import Count, count_of, share_start
+from sand_sim.engine.count import Count, count_of, part_start, share_start
 from sand_sim.engine.kernel import kernel
 
 
@@ -46,8 +46,8 @@ def count_own_keys(
 ):
     """Each lane owns an interval of keys and counts the items that carry them."""
     bins = count_of(bins_in_use)
-    first = int(wp.int64(bins) * wp.int64(lane) // wp.int64(lanes))
-    last = int(wp.int64(bins) * wp.int64(lane + 1) // wp.int64(lanes))
+    first = part_start(bins, lane, lanes)
+    last = part_start(bins, lane + 1, lanes)
     for key in range(first, last):
         counts[key] = 0
     total = int(0)
@@ -73,8 +73,8 @@ def place_own_keys(
 ):
     """Turn the counts of the lane's keys into starts and put their items in order."""
     bins = count_of(bins_in_use)
-    first = int(wp.int64(bins) * wp.int64(lane) // wp.int64(lanes))
-    last = int(wp.int64(bins) * wp.int64(lane + 1) // wp.int64(lanes))
+    first = part_start(bins, lane, lanes)
+    last = part_start(bins, lane + 1, lanes)
     start = int(0)
     for before in range(lane):
         start += totals[before]

@@ -12,7 +12,7 @@ import warp as wp
 from sand_sim.contact.response import build_drifting, build_meeting, memory_type
 from sand_sim.engine.act import build_act, build_acts
 from sand_sim.engine.contact_list import build_note
-from sand_sim.engine.count import count_of
+from sand_sim.engine.count import count_of, part_start
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.pair_contact import build_direction
 from sand_sim.engine.recipe import Recipe
@@ -276,7 +276,7 @@ def build_wrench_blocks(recipe: Recipe) -> wp.Kernel:
         own = lane + wp.tid()
         pairs = count_of(pair_spans)
         number = (pairs + wp.static(SUM_BLOCK) - 1) // wp.static(SUM_BLOCK)
-        for block in range(number * own // shares, number * (own + 1) // shares):
+        for block in range(part_start(number, own, shares), part_start(number, own + 1, shares)):
             for tool in range(tools):
                 blocks[block * tools + tool, 0] = wp.vec3d(wp.float64(0.0))
                 blocks[block * tools + tool, 1] = wp.vec3d(wp.float64(0.0))

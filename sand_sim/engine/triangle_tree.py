@@ -8,6 +8,8 @@ import math
 import numpy as np
 import warp as wp
 
+from sand_sim.engine.count import part_start
+
 _IN_LEAF = 4  # triangles at most
 _MERGED = math.cos(math.radians(30.0))
 
@@ -149,8 +151,8 @@ def nearest_on_tree(
         else:
             if near:
                 leaf = node - tree.leaves
-                first = int(wp.int64(tree.triangles) * wp.int64(leaf) // wp.int64(tree.leaves))
-                last = int(wp.int64(tree.triangles) * wp.int64(leaf + 1) // wp.int64(tree.leaves))
+                first = part_start(tree.triangles, leaf, tree.leaves)
+                last = part_start(tree.triangles, leaf + 1, tree.leaves)
                 for k in range(tree.first_triangle + first, tree.first_triangle + last):
                     a = corners[4 * k]
                     face = corners[4 * k + 3]

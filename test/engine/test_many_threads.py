@@ -8,9 +8,10 @@ from scenes import floor, write_small_scene
 
 from sand_sim import World, load_scene
 from sand_sim.engine import sorting
-from sand_sim.engine.count import Count
+from sand_sim.engine.count import Count, part_start
 from sand_sim.engine.cuda import CudaRecorder
 from sand_sim.engine.device import open_device
+from sand_sim.engine.kernel import kernel
 from sand_sim.engine.lanes import CpuDevice
 from sand_sim.scene.types import SceneError
 
@@ -131,6 +132,18 @@ def test_sort_is_stable_whatever_the_order_of_threads(keys, reverse):
         recorder.each(sorting.order_places, bins, [0, result.starts, result.order])
     np.testing.assert_array_equal(result.starts.numpy(), np.searchsorted(np.sort(key[:number]), np.arange(keys + 1)))
     np.testing.assert_array_equal(result.order.numpy()[:number], np.argsort(key[:number], kind="stable"))
+
+
+@kernel
+def cut(number: int, parts: int, starts: wp.array(dtype=int)):
+    starts[wp.tid()] = part_start(number, wp.tid(), parts)
+
+
+@pytest.mark.parametrize("number", [7, 600_000, 2**31 - 1])
+def test_parts_of_as_many_items_as_a_large_gpu_holds(number):
+    starts = wp.empty(4097, dtype=int, device="cpu")
+    wp.launch(cut, 4097, [number, 4096, starts], device="cpu")
+    np.testing.assert_array_equal(starts.numpy(), number * np.arange(4097) // 4096)
 
 
 def test_device_is_refused_by_name(tmp_path):
