@@ -4,7 +4,9 @@ A program, with its loop over steps and all it does only now and then, becomes o
 the host is not asked until the frame is over. Launches follow one another, so nobody waits; there is one lane, whose items many
 threads take in strides, and shares of what has to be walked through in order are many.
 
-Every item and every sum is computed by the same code in the same order as on a CPU; what differs is how the compilers round.
+Every item and every sum is computed by the same code in the same order as on a CPU; what differs is how the compilers round. Two
+things hang on which thread comes first, and no motion hangs on them: the order in which retired grains lie, and the last digits
+of the energy that they have carried off.
 """
 
 from collections.abc import Callable
