@@ -1,7 +1,5 @@
 """The CUDA device's way of sharing work out, on a CPU: the same launch sizes, lanes, shares and sorts, only one after another."""
 
-import warp as wp
-
 from sand_sim.engine.cuda import CudaDevice, CudaRecorder
 
 
@@ -25,6 +23,3 @@ class ManyThreads(CudaDevice):
 
     def record(self, program):
         return (lambda: program(CudaRecorder(self))) if self.eager else super().record(program)
-
-    def synchronize(self):
-        assert not wp.is_cuda_available()
