@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 import warp as wp
+from kinds import KINDS, flying_grains
 from many_threads import ManyThreads
-from scenes import floor, write_small_scene
+from scenes import write_small_scene
 
 from sand_sim import World, load_scene
 from sand_sim.engine import sorting
@@ -26,11 +27,6 @@ def with_device(monkeypatch):
             return make()
 
     return made
-
-
-def strewn(number, low, high, seed):
-    random = np.random.default_rng(seed)
-    return random.uniform(low, high, (number, 3))
 
 
 def same_state(a, b):
@@ -60,50 +56,10 @@ def test_same_bits_with_a_tool(with_device, tmp_path, eager):
         same_state(worlds[0], world)
 
 
-CASES = {
-    "grains that leave": {"velocity": [3.0, 0.0, 0.0], "domain": {"low": [-0.01] * 3, "high": [0.1, 0.09, 0.09]}},
-    "rolling and cohesion": {
-        "contact": {"rolling": "spring", "cohesion": "capillary"},
-        "numbers": {"rolling_friction": 0.1},
-        "liquid": {"saturation": 0.1, "surface_tension": 0.072, "contact_angle": 0.3},
-    },
-    "symplectic": {"integrator": "symplectic_euler"},
-    "floor": {"boundaries": floor(-0.005), "gravity": [0.0, 0.0, -9.81]},
-    "double": {"precision": "double"},
-    "plunger": {
-        "boundaries": [
-            {
-                "type": "plunger",
-                "name": "press",
-                "material": "wall",
-                "point": [0.0, 0.0, -0.006],
-                "normal": [0.0, 0.0, 1.0],
-                "force": 20.0,
-                "max_speed": 1.0,
-            }
-        ]
-    },
-    "bodies": {
-        "bodies": {
-            name: {
-                "spheres": [[0.0, 0.0, 0.0, 0.006], [0.008, 0.0, 0.0, 0.006], [0.0, 0.008, 0.0, 0.005]],
-                "material": "grain",
-                "pose": {"position": [0.03, 0.03, height]},
-            }
-            for name, height in (("one", -0.013), ("two", 0.09))
-        }
-    },
-}
-
-
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", KINDS)
 def test_same_bits(with_device, make_world, case):
-    lattice = np.stack(np.meshgrid(range(7), range(7), range(7), indexing="ij"), -1).reshape(-1, 3)
-    position = 0.0118 * lattice + strewn(len(lattice), 0.0, 0.0004, seed=3)
-    radius = np.where(np.arange(len(lattice)) % 7 == 0, 0.0062, 0.0055)
-    velocity = strewn(len(lattice), -1.0, 1.0, seed=4) + CASES[case].get("velocity", 0.0)
-    fields = {"precision": "single"} | CASES[case] | {"velocity": velocity}
-    worlds = [with_device(device, lambda: make_world(position, radius, **fields)) for device in (CpuDevice(1), ManyThreads())]
+    devices = CpuDevice(1), ManyThreads()
+    worlds = [with_device(device, lambda: flying_grains(make_world, case)) for device in devices]
     for world in worlds:
         world.step(300)
     same_state(*worlds)

@@ -12,6 +12,7 @@ from cuda_compiling import compile_all
 import sampler
 from sampler import SignedDistance, sample_body
 from sampler.field import make_field
+from sampler.surface import Surface
 
 GPU = pytest.mark.skipif(not wp.is_cuda_available(), reason="needs an NVIDIA GPU")
 
@@ -33,6 +34,17 @@ def test_distances_are_those_of_the_cpu():
     points = np.random.default_rng(0).uniform(-1.2, 1.2, (20_000, 3))
     wanted, found = (SignedDistance(overlapping_parts(), device).query(points)[0] for device in ("cpu", "cuda"))
     np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-12)
+
+
+@GPU
+@pytest.mark.parametrize("rough", [False, True])
+@pytest.mark.parametrize("kept", [slice(40, None), slice(None, None, 2)], ids=["hole", "ragged"])
+def test_winding_of_open_surfaces_is_that_of_the_cpu(kept, rough):
+    """Where solid angles are asked for; of what is far away they are sums over boxes, which each device makes its own."""
+    triangles = trimesh.creation.icosphere(3).triangles[kept]
+    points = np.random.default_rng(0).uniform(-1.2, 1.2, (5000, 3))
+    wanted, found = (Surface(triangles, device).winding(points, rough) for device in ("cpu", "cuda"))
+    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=0.1 if rough else 0.01)
 
 
 @GPU
