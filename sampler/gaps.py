@@ -1,21 +1,23 @@
 """How particles cover a surface: where gaps are, which particles are too near to others, and which would be missed the least."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import warp as wp
 
+from sampler.climbing import climb
 from sampler.gap_kernels import Nearest, find_gaps, find_nearest
 from sampler.launching import launch_shares
 from sampler.skin import Skin
 
-_DOUBT = 0.08  # places so near to being a gap are looked at more closely, in spacings
-_WATCHED = 0.15  # and other places that were found so near to being one, the next time, too
-_CLOSER = (0.10, 0.10, 0.05, 0.05)  # how far beside them, in spacings
-_GAP, _SKIN_GAP = 0.78, 0.95  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
+_WATCHED = 0.15  # places that were found so near to being a gap are looked at the next time, too, in spacings
+_STEPS = 8  # from the worst places known to the worst ones near by
+_GAP = 0.785, 0.965  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
+_GRAVE, _WEIGHT = (0.785, 0.99), 4.0  # and from these ways on a grave one, which counts so much more
 _GAPS_APART = 1.2  # gaps nearer than this to a deeper one wait, in spacings
 _ROOM, _NEAR = 0.55, 0.4  # a gap is filled so far from particles of other skins, or as far as can be so near to it; in spacings
-_LEAST = 0.40  # particles nearer than this to one another are a fault, in spacings
+_LEAST, _TOO_NEAR = 0.40, 0.37  # particles nearer than this to one another are a fault, and a grave one, in spacings
 _LONELY, _BESIDE = 1.09, (0.6, 1.06)  # those farther than this from all others get a neighbour, how far beside them; in spacings
 _MOVED, _TURNED = 1e-3, 0.999  # what has moved less, in spacings, and turned less, by the cosine, lies where it was
 FAR = 2.0  # how far particles are looked for, in spacings; farther ones are as bad
@@ -105,16 +107,14 @@ class Gaps:
 
     def add(self, points: np.ndarray, normals: np.ndarray, fixed: bool = False) -> None:
         """Look at more places, shape (n, 3) [m], with the normals there; for good if they are fixed, else those in doubt."""
-        found = self.measure(points, normals, 1.0 if fixed else _GAP - _WATCHED)
+        found = self.measure(points, normals, 1.0 if fixed else _GAP[0] - _WATCHED)
         new = Places(points, normals, *found, np.full(len(points), fixed))
         self.places = self.places.joined(new if fixed else new.at(new.excess > -_WATCHED))
 
     def judge(self, pinned: np.ndarray, random: np.random.Generator) -> Verdict:
         """Say what is wrong; of particles too near to others those that are not pinned, shape (n,), are to blame."""
         nearest = self.neighbour_distances()
-        for _ in range(2):
-            doubtful = np.flatnonzero(self.places.excess > -_DOUBT)[: len(self.points)]
-            self.add(*self.beside(self.places.points[doubtful], self.places.normals[doubtful], _CLOSER, random))
+        self._seek(random)
         places, free, excess = self.places, self.places.closest["way"], self.places.excess
         for i in np.flatnonzero(nearest > _LONELY):
             away = np.linalg.norm(places.points - self.points[i], axis=1) / self.spacing
@@ -125,8 +125,9 @@ class Gaps:
         crowded = np.flatnonzero(nearest < _LEAST)
         crowded = crowded[np.lexsort((nearest[crowded], pinned[crowded]))]
         gaps = self._worst(excess, len(crowded))
-        open_ = np.maximum(free[gaps] - _GAP, 0.0).sum()
-        fault = float(4.0 * open_ + np.maximum(excess[gaps], 0.0).sum() + (_LEAST - nearest[crowded]).sum())
+        grave = np.maximum(_excess(free[gaps], places.own["way"][gaps], _GRAVE), 0.0).sum()
+        grave += np.maximum(_TOO_NEAR - nearest[crowded], 0.0).sum()
+        fault = float(_WEIGHT * grave + np.maximum(excess[gaps], 0.0).sum() + (_LEAST - nearest[crowded]).sum())
         fill = self._roomiest(gaps)
         verdict = Verdict(places.points[fill], places.normals[fill], crowded, self._missed(), fault)
         self.places = places.at(places.fixed | (excess > -_WATCHED))
@@ -152,6 +153,14 @@ class Gaps:
         launch_shares(find_gaps, len(points), [*inputs, self.spacing / self.skin.unit, enough, most], list(found), self.device)
         return tuple(values.numpy() for values in found)
 
+    def _seek(self, random: np.random.Generator) -> None:
+        """Look at the worst places near the worst ones known, too."""
+        places, beside = self.places, partial(self.beside, random=random)
+        for along, found in enumerate((places.closest, places.own)):
+            known = places.points, places.normals, found
+            worst = climb(*known, beside, lambda *at, k=along: self.measure(*at)[k]["way"], _STEPS, self.spacing)
+            self.add(*worst[:2])
+
     def _missed(self) -> np.ndarray:
         """How far in a gap the worst place would be without each particle."""
         left = []
@@ -176,14 +185,14 @@ class Gaps:
     def _roomiest(self, gaps: np.ndarray) -> np.ndarray:
         """Gaps, or in place of those with a particle of another skin behind them, places beside them that are farther from it."""
         points, normals, free = self.places.points, self.places.normals, self.places.closest["way"]
-        roomy = np.flatnonzero((free > _ROOM) & (self.places.own["way"] > _ROOM))
-        chosen = gaps.copy()
+        room = np.minimum(free, self.places.own["way"])
+        roomy, chosen = np.flatnonzero(room > _LEAST), gaps.copy()
         for n, k in enumerate(gaps):
             if free[k] < _ROOM:
                 near = np.linalg.norm(points[roomy] - points[k], axis=1) < _NEAR * self.spacing
                 near = roomy[near & (normals[roomy] @ normals[k] > 0.5)]
                 if len(near):
-                    chosen[n] = near[free[near].argmax()]
+                    chosen[n] = near[room[near].argmax()]
         return chosen
 
     def beside(
@@ -200,8 +209,8 @@ class Gaps:
         return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
 
 
-def _excess(free: np.ndarray, own: np.ndarray) -> np.ndarray:
-    return np.maximum(free - _GAP, own - _SKIN_GAP)
+def _excess(free: np.ndarray, own: np.ndarray, gap: tuple[float, float] = _GAP) -> np.ndarray:
+    return np.maximum(free - gap[0], own - gap[1])
 
 
 def _near_cells(points: np.ndarray, others: np.ndarray, cell: float) -> np.ndarray:

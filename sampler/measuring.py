@@ -1,8 +1,11 @@
 """How evenly particles lie and how far from them places of the surface are, in the end: without limit, up to the worst places."""
 
+from functools import partial
+
 import numpy as np
 
 from sampler.body import Evenness
+from sampler.climbing import climb
 from sampler.gaps import FAR, Gaps
 from sampler.lattice import lattice_spacing
 from sampler.skin import Skin
@@ -11,9 +14,7 @@ _MEASURED = 50  # places per particle, over the area, and as many over the edges
 _ENOUGH = 0.63  # particles nearer than this need no next one, in spacings
 _WIDER = 4.0  # where none is found, they are looked for so much farther
 _SURVEYED = 5000  # of the places that have none near, so many are asked where it is
-_WORST = 100  # places from which the worst ones near by are sought
-_STEPS = 0.12 * 0.7 ** np.arange(16.0)  # how far beside them, one after another, in spacings
-_TRIALS = 5  # places tried in each step
+_STEPS = 16  # from the worst of them to the worst ones near by
 
 
 def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Evenness:
@@ -24,7 +25,7 @@ def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Eve
     gaps = Gaps(skin, lattice_spacing(float(skin.areas.sum()), len(points)))
     gaps.look(points, normals)
     random = np.random.default_rng(1)
-    places = skin.places(_MEASURED * len(points), random)
+    places = skin.places(_MEASURED * len(points), gaps.spacing, random)
     worst = [_worst_place(gaps, *places, found, along, random) for along, found in enumerate(gaps.measure(*places, _ENOUGH))]
     nearest = _neighbours(gaps)
     variation = nearest.std() / nearest.mean() if len(points) > 1 else 0.0
@@ -47,18 +48,8 @@ def _worst_place(
     far = np.flatnonzero(found["way"] >= FAR)
     far = far[:: 1 + len(far) // _SURVEYED]
     found[far] = _measure(gaps, points[far], normals[far], along)
-    order = np.argpartition(-found["way"], min(20 * _WORST, len(points)) - 1)[: 20 * _WORST]
-    order = order[np.argsort(-found["way"][order], kind="stable")]
-    first = np.unique(found["which"][order], return_index=True)[1]  # one for each particle, so that they lie in different gaps
-    chosen = order[np.sort(first)[:_WORST]]
-    points, normals, way = points[chosen], normals[chosen], found["way"][chosen]
-    for step in _STEPS:
-        places = gaps.beside(points, normals, (step,) * _TRIALS, random)
-        trial = _measure(gaps, *places, along)["way"].reshape(_TRIALS, -1)
-        best, each = trial.argmax(axis=0), np.arange(len(points))
-        better = np.flatnonzero(trial[best, each] > way)
-        k = best[better] * len(points) + better
-        points[better], normals[better], way[better] = places[0][k], places[1][k], trial[best, each][better]
+    beside = partial(gaps.beside, random=random)
+    way = climb(points, normals, found, beside, lambda *at: _measure(gaps, *at, along)["way"], _STEPS, gaps.spacing)[2]
     return way.max()
 
 

@@ -7,7 +7,7 @@ from sampler.repair import SHEET, RepairedMesh
 from sampler.surface import Surface
 from sampler.topology import edges_of, link_items
 
-_OUT, _PER_SPACING = 0.43, 3.0  # half a lattice row beyond rims, in spacings; so many places per spacing
+_OUT, _PER_SPACING = 0.5, 3.0  # beyond rims, in spacings: over half a lattice row, which covers them; so many per spacing
 
 
 def closed_triangles(repaired: RepairedMesh, thickness: float) -> tuple[np.ndarray, np.ndarray]:

@@ -10,6 +10,7 @@ _STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what 
 _TRIAL = 4000  # random places that show whether anything is buried at all
 _DEEPEST = 400  # cuts through one triangle
 _ISLAND = 1.5  # triangles longer than this are halved, others cut along the planes that cross them; in spacings
+_TOGETHER = 0.15  # triangles nearer than this that look the same way lie together, in spacings
 _NARROW = 1e-7  # of the diagonal: narrower triangles have no normal in single precision
 _THIRDS = (np.ones((3, 3)) + 3.0 * np.eye(3)) / 6.0  # places of a triangle, the middles of parts of it
 _CENTRE = np.ones((1, 3)) / 3.0
@@ -38,11 +39,22 @@ class Skin(Surface):
         super().__init__(triangles, device)
         self.areas = self.areas if layers is None else self.areas / layers
 
-    def places(self, number: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """Random places, so many over the area and as many over the longest edges, so that strips and specks get their share."""
-        edge = longest_edges(self.triangles)
-        both = self.sample(number, random), self.sample(number, random, edge + edge.mean())
-        return tuple(np.concatenate(pair) for pair in zip(*both, strict=True))
+    def places(self, number: int, spacing: float, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+        """Places, shape (n, 3) [m], and the normals there, in reach of every gap between particles, also of one on a speck.
+
+        Args:
+            number: of random places over the area, and of as many over the longest edges, for strips.
+            spacing: of the particles [m]; of triangles much smaller that lie together one has a place.
+            random: where chance comes from.
+        """
+        edge, middle = longest_edges(self.triangles), self.triangles.mean(axis=1)
+        side = np.abs(self.normals).argmax(axis=1)
+        up = np.take_along_axis(self.normals, side[:, None], axis=1)[:, 0] > 0.0
+        cell = ((middle - middle.min(axis=0)) / (_TOGETHER * spacing)).astype(np.int64)
+        key = np.ravel_multi_index((*cell.T, side, up), (*cell.max(axis=0) + 1, 3, 2))
+        one = np.unique(key, return_index=True)[1]
+        groups = self.sample(number, random), self.sample(number, random, edge + edge.mean()), (middle[one], self.normals[one])
+        return tuple(np.concatenate(group) for group in zip(*groups, strict=True))
 
     def sample(self, number: int, random: np.random.Generator, weight: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Random places, stratified over the area.

@@ -16,8 +16,8 @@ _HALVINGS = 7  # of the range in which the distance of the first placing is soug
 _TURNS, _FEW, _REFILL_TURNS = 60, 1000, 10  # few particles turn twice as often: more of them lie on rims and small pieces
 _REFILLS = 16
 _SAMPLED = 40  # places per particle at which gaps are looked for, over the area; and as many over the edges
-_CONFIRMED, _LOOKS = 80, 3  # and at fresh ones where hardly any is left, until none is found there, so often at most
-_HARDLY, _FINE = 0.5, 0.02  # sum of faults in spacings at which that is so, and at which all is well
+_CONFIRMED, _LOOKS = 60, 3  # and at fresh ones where hardly any is left, until none is found there, so often at most
+_HARDLY, _FINE = 1.0, 0.02  # sum of faults in spacings at which that is so, and at which all is well
 _STRENGTH = 0.25  # of a push, in spacings
 _AROUND = 3.0  # distance from a filled gap or a removed particle within which others move, in spacings
 _SPARE, _MORE = 0.005, 0.009  # share of the particles kept back for gaps, and share that may be added above the wanted number
@@ -67,10 +67,10 @@ def spread_particles(
         found = settle(*state.result())  # on an edge either face may be the nearest; judge by the final choice
         gaps.look(*found)
         if turn == 0:
-            gaps.add(*skin.places(_SAMPLED * number, random), fixed=True)
+            gaps.add(*skin.places(_SAMPLED * number, state.spacing, random), fixed=True)
         verdict = gaps.judge(state.pinned, random)
         if looks < _LOOKS and verdict.fault < (_FINE if looks else _HARDLY):  # a gap on a small piece may have had no place
-            gaps.add(*skin.places(_CONFIRMED * number, random))
+            gaps.add(*skin.places(_CONFIRMED * number, state.spacing, random))
             verdict = gaps.judge(state.pinned, random)
             looks, least = looks + 1, np.inf  # what was found before had not been looked at so closely
         stuck = 0 if verdict.fault < least else stuck + 1

@@ -239,10 +239,10 @@ def test_particles_keep_off_the_rims_of_sheets_so_that_they_lie_as_evenly_as_on_
         even = body.evenness
         assert even.variation < 0.035
         assert even.farthest < 1.09
-        assert even.coverage < (0.8 if width > 0.05 else 0.97)  # a row of particles in a strip as wide as h leaves its corners
+        assert even.coverage < (0.8 if width > 0.05 else 1.0)  # a zigzag in a strip little wider than h leaves corners
         places = np.random.default_rng(seed).uniform(0.0, [1.0, width, 0.0], (200 * count, 3))
         found = distances(places, body.points).max() / body.spacing
-        assert found < (0.8 if width > 0.05 else 0.95)
+        assert found < (0.8 if width > 0.05 else 1.0)
         assert found <= even.coverage + 1e-6
 
 

@@ -52,3 +52,25 @@ def test_what_moves_is_measured_anew():
         first = np.linalg.norm(gaps.places.points[:, None] - points, axis=2).min(axis=1) / gaps.spacing
         assert gaps.places.closest["way"] == pytest.approx(np.minimum(first, 2.0), abs=1e-5)
         assert gaps.neighbour_distances().shape == (len(points),)
+
+
+def worst_place(centres, reach, points):
+    """Largest distance from points over squares around centres, and where the twenty farthest places of them lie."""
+    aside = reach * np.linspace(-1.0, 1.0, 201)
+    places = np.clip((centres[:, None] + np.stack(np.meshgrid(aside, aside), axis=-1).reshape(-1, 2)).reshape(-1, 2), 0.0, 1.0)
+    far = np.min([np.linalg.norm(places - point, axis=1) for point in points], axis=0)
+    return far.max(), places[np.argsort(-far)[:20]]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_worst_gap_is_found_from_few_places(seed):
+    random = np.random.default_rng(seed)
+    gaps, (points, up) = plane_gaps(150), scatter(random, 250)
+    gaps.look(points, up)
+    gaps.add(*scatter(random, 1500), fixed=True)
+    known = gaps.places.closest["way"].max()
+    worst, centres = worst_place(np.full((1, 2), 0.5), 0.5, points[:, :2])
+    worst = worst_place(centres, 0.004, points[:, :2])[0] / gaps.spacing
+    gaps.judge(np.zeros(250, bool), random)
+    assert known < worst - 0.02
+    assert gaps.places.closest["way"].max() == pytest.approx(worst, abs=0.015)

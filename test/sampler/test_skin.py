@@ -189,3 +189,13 @@ def test_few_particles_do_not_make_the_mass_of_crossing_parts_worse(count):
     box, cylinder = trimesh.creation.box((1.0, 0.8, 0.6)), trimesh.creation.cylinder(0.2, 2.0)
     body = sample_body(trimesh.util.concatenate([box, cylinder]), radius=0.05, count=count)
     assert body.volume == pytest.approx(box.volume + cylinder.volume * (1.0 - 0.6 / 2.0), rel=1e-9)
+
+
+def test_a_speck_gets_a_place_on_each_of_its_sides():
+    plate, speck = box((1.0, 1.0, 0.1), (0, 0, 0)), box((1e-4, 1e-4, 1e-4), (0, 0, 1.0))
+    skin = Skin(np.concatenate([plate.triangles, speck.triangles]))
+    points, normals = skin.places(100, 0.05, np.random.default_rng(0))
+    on = points[:, 2] > 0.9
+    assert len(points) < 250
+    assert {tuple(normal) for normal in normals[on].round(6)} == {tuple(s * row) for s in (-1.0, 1.0) for row in np.eye(3)}
+    assert np.allclose(skin.closest(points)[0], points, rtol=0.0, atol=1e-6)
