@@ -1,7 +1,6 @@
 """Reading a mesh file and refusing what cannot become a body."""
 
 import io
-import re
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +12,13 @@ from sampler.errors import MeshError
 from sampler.obj import plain_obj
 from sampler.strips import read_strips
 
+_WITH_UNIT = (".dae", ".zae", ".3mf")  # files that state their unit
+
 
 def read_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
     """Read a triangle mesh, in metres, as it stands in the file: nothing is merged or mended yet.
 
-    Unit and node transforms of DAE and glTF files are applied; the up axis of a DAE file is not, as in RViz.
+    Units of DAE and 3MF files and node transforms are applied; the up axis of a DAE file is not, as in RViz.
 
     Args:
         path: STL, OBJ, PLY (also of triangle strips), DAE or whatever else trimesh reads.
@@ -78,9 +79,9 @@ def _load(path: Path) -> trimesh.Trimesh:
     mesh = scene.to_mesh() if shapes else None
     if mesh is None or not len(mesh.faces):
         raise MeshError(f"mesh {path.name}: has no triangles")
-    unit = re.match(r"([-+.\deE]+) \* meters", str(shapes[0].metadata.get("units", "")))
-    if path.suffix.lower() in (".dae", ".zae") and unit:
-        mesh.apply_scale(float(unit.group(1)))
+    unit = shapes[0].metadata.get("units")
+    if path.suffix.lower() in _WITH_UNIT and unit:
+        mesh.apply_scale(trimesh.units.unit_conversion(unit, "meters"))
     return mesh
 
 

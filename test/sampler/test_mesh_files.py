@@ -33,6 +33,15 @@ def test_unit_and_node_transforms_of_dae_are_applied(tmp_path, box):
     assert mesh.bounds.mean(axis=0) == pytest.approx([3 * 0.0254, 0, 0], abs=1e-7)
 
 
+@pytest.mark.parametrize(("unit", "metres"), [("millimeter", 1e-3), ("millimeters", 1e-3), ("inch", 0.0254), ("micron", 1e-6)])
+def test_the_unit_of_3mf_is_applied(tmp_path, box, monkeypatch, unit, metres):
+    box.metadata["units"] = unit  # as trimesh tells it, which needs lxml to read such a file
+    monkeypatch.setattr(trimesh, "load_scene", lambda path, **_: trimesh.Scene(box))
+    path = tmp_path / "box.3mf"
+    path.write_bytes(b"PK")
+    assert read_mesh(path, scale=2.0).extents == pytest.approx(2.0 * metres * np.array([0.1, 0.06, 0.02]), rel=1e-12)
+
+
 def test_materials_of_obj_need_no_pillow(tmp_path, box):
     path = tmp_path / "painted.obj"
     lines = [f"v {x} {y} {z}" for x, y, z in box.vertices] + ["vt 0 0", "vt 1 0", "vt 0 1"]
