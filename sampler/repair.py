@@ -104,8 +104,9 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     loose = sheet.copy()
     crumbs = sheet & (area < _CRUMB * area.sum())
     if enclosing or (crumbs.sum() > _SCATTERED and sheets == "auto"):
-        sheet = sheet & ~crumbs & (not enclosing)
-        report.warnings.append(f"{crumbs.sum()} small open pieces are taken for parts of one cracked surface")
+        taken = sheet if enclosing else crumbs
+        sheet = sheet & ~taken
+        report.warnings.append(f"{taken.sum()} open pieces are taken for parts of one cracked surface")
         enclosing = True
     kind = np.where(sheet[component], SHEET, SOLID)
     report.steps["holes closed"] = round(float((1.0 / (corners[keep] - 2)).sum()))  # a loop of n corners takes n - 2 faces

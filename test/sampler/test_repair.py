@@ -91,6 +91,14 @@ def test_cracks_of_a_ten_thousandth_cost_hardly_any_volume(seed):
     assert integrate(repaired.triangles)[0] == pytest.approx(pipe.volume, rel=1e-3)
 
 
+def test_open_pieces_of_a_solid_are_counted():
+    box = trimesh.creation.box((1.0, 1.0, 1.0))
+    top = box.face_normals[:, 2] > 0.5
+    lid = trimesh.Trimesh(box.vertices, box.faces[top]).subdivide()  # its edges meet those of the rest in their middles
+    repaired = repair_mesh(trimesh.util.concatenate([trimesh.Trimesh(box.vertices, box.faces[~top]), lid]))
+    assert repaired.report.warnings == ["2 open pieces are taken for parts of one cracked surface"]
+
+
 def test_every_step_is_counted():
     box = trimesh.creation.box((1.0, 1.0, 1.0))
     faces = np.concatenate([box.faces, box.faces[:2], box.faces[2:3, ::-1], [[0, 0, 1]]])
