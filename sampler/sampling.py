@@ -226,10 +226,10 @@ def _spacing(radius, spacing, count, grain, triangles) -> float:
 
 
 def _mass(solid, free, parent, layers, plates, warnings) -> tuple[float, np.ndarray, np.ndarray]:
-    """From all triangles of the solid where none is buried, else from its free parts; and from plates beside it."""
+    """From all triangles of the solid where none is buried or lies on another, else from its free parts; and from plates."""
     whole = np.bincount(parent, minlength=len(solid.triangles)) == (solid.areas > 0.0)
     pieces, share = solid.triangles, np.ones(len(solid.triangles))
-    if not np.all(whole):
+    if not np.all(whole) or np.any(layers > 1):
         pieces, share = free, 1.0 / layers
         warnings.append("parts of the surface are buried in others; volume and inertia are those of the union")
     every = np.concatenate([pieces, plates])

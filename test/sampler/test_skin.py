@@ -183,6 +183,14 @@ def test_small_pieces_that_face_the_other_way_are_found(seed):
     assert away.max() < np.sqrt(2.0 / np.sqrt(3.0) / 400)
 
 
+@pytest.mark.parametrize("apart", [1e-7, 1e-6])
+def test_a_part_that_is_there_twice_weighs_once(apart):
+    ring, block = trimesh.creation.torus(1.0, 0.2), box((1.0, 0.6, 0.4), (3.0, 0, 0))
+    twin = ring.copy().apply_translation((apart, 0.0, apart))
+    body = sample_body(trimesh.util.concatenate([ring, twin, block]), 0.05, count=200)
+    assert body.volume == pytest.approx(ring.volume + block.volume, rel=10.0 * apart)
+
+
 @pytest.mark.parametrize("count", [20, 400])
 def test_few_particles_do_not_make_the_mass_of_crossing_parts_worse(count):
     """A cylinder through a box: how finely triangles are cut must not depend on how many particles are wanted."""
