@@ -8,11 +8,16 @@ import warp as wp
 from sampler.errors import MeshError
 
 
+def is_positive(value: object) -> bool:
+    """Whether it is a finite number above zero, not its text or a truth."""
+    return isinstance(value, Real) and not isinstance(value, bool) and bool(np.isfinite(value)) and value > 0.0
+
+
 def check_options(lengths: dict[str, float | None], count: int | None, seed: int, device: str) -> None:
     """See that numbers make sense.
 
     Args:
-        lengths: by name, in metres; None where they are not given.
+        lengths: by name, in metres; None where they are not given, as all but the radius may be.
         count: wanted number of particles.
         seed: of the random start.
         device: Warp device.
@@ -21,7 +26,7 @@ def check_options(lengths: dict[str, float | None], count: int | None, seed: int
         MeshError: if a length is not positive and finite, the count or the seed no whole number, or the device not here.
     """
     for name, value in lengths.items():
-        if value is not None and not (isinstance(value, Real) and np.isfinite(value) and value > 0.0):
+        if (value is not None or name == "radius") and not is_positive(value):
             raise MeshError(f"particle {name} must be positive, got {value!r}")
     for name, value, least in (("particle count", count, 1), ("seed", seed, 0)):
         if value is not None and not (isinstance(value, Integral) and not isinstance(value, bool) and value >= least):

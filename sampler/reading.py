@@ -10,6 +10,7 @@ from sampler.checking import check_file, is_text_stl
 from sampler.dae import plain_dae
 from sampler.errors import MeshError
 from sampler.obj import plain_obj
+from sampler.options import is_positive
 from sampler.strips import read_strips
 
 _WITH_UNIT = (".dae", ".zae", ".3mf")  # files that state their unit
@@ -29,8 +30,8 @@ def read_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
             finite.
     """
     path = Path(path)
-    if not np.isfinite(scale) or scale <= 0.0:
-        raise MeshError(f"mesh {path.name}: scale must be positive, got {scale}")
+    if not is_positive(scale):
+        raise MeshError(f"mesh {path.name}: scale must be positive, got {scale!r}")
     check_file(path)
     try:
         mesh = read_strips(path) if path.suffix.lower() == ".ply" else None

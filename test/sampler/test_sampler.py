@@ -52,7 +52,7 @@ def test_bad_meshes_are_refused(tmp_path, name, content, reason):
     assert reason in str(caught.value)
 
 
-@pytest.mark.parametrize("scale", [0.0, -1.0, float("nan")])
+@pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), "1", None])
 def test_bad_scale_is_refused(scale):
     with pytest.raises(MeshError, match="scale must be positive"):
         read_mesh(BUCKET, scale)
@@ -145,6 +145,7 @@ def test_same_seed_same_body(sphere):
     ("options", "reason"),
     [
         ({"radius": "wide"}, "radius must be positive, got 'wide'"),
+        ({"radius": None}, "radius must be positive, got None"),
         ({"spacing": float("nan")}, "spacing must be positive"),
         ({"count": 10.5}, "count must be a whole number from 1 on, got 10.5"),
         ({"count": True}, "count must be a whole number"),
@@ -155,6 +156,12 @@ def test_same_seed_same_body(sphere):
 def test_options_that_make_no_sense_are_refused(sphere, options, reason):
     with pytest.raises(MeshError, match=reason):
         sample_body(sphere, **{"radius": 0.1} | options)
+
+
+@pytest.mark.parametrize("density", ["7", True, 0.0, float("inf")])
+def test_densities_that_make_no_sense_are_refused(sphere, density):
+    with pytest.raises(MeshError, match="positive"):
+        sample_body(sphere, radius=0.02).mass_properties(density=density)
 
 
 @pytest.mark.parametrize(
