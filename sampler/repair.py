@@ -152,17 +152,9 @@ def _drop(faces: np.ndarray, report: RepairReport) -> np.ndarray:
     back[group[~even]] = True
     opposed &= back
     keep[first[_interfaces(faces[first], opposed)]] = False
-    if _balanced(faces) and not _balanced(faces[keep]):  # solids that overlap have a face in common; each of them needs its own
-        keep[:] = True
     for name, count in (("degenerate faces dropped", degenerate.sum()), ("duplicate faces dropped", (~keep).sum())):
         report.steps[name] = report.steps.get(name, 0) + int(count)
     return faces[keep]
-
-
-def _balanced(faces: np.ndarray) -> bool:
-    """Whether faces run along each edge as often one way as the other, as around solids."""
-    edges = edges_of(faces)
-    return not np.any(np.bincount(edges.edge, np.where(edges.forward, 1, -1)))
 
 
 def _interfaces(faces: np.ndarray, opposed: np.ndarray) -> np.ndarray:
