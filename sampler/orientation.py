@@ -12,8 +12,8 @@ _VOTERS = 100  # largest faces of a piece, which tell what side of it is the ins
 def agree_faces(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, int]:
     """Turn faces so that neighbours run along their common edges in opposite directions.
 
-    Where more than two faces share an edge, those next to one another around it should agree; a majority of such edges decides
-    for each pair of pieces.
+    Where more than two faces share an edge, those next to one another around it should agree, and do if two of them are one face
+    of two solids and as many run along it one way as the other; a majority of such edges decides for each pair of pieces.
 
     Returns:
         Faces, shape (n, 3); component of each, shape (n,); piece without many-sided edges that each belongs to, shape (n,);
@@ -38,6 +38,10 @@ def agree_faces(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np
 def _many_sided(vertices: np.ndarray, faces: np.ndarray, edges: Edges, group: np.ndarray, turned: np.ndarray):
     """Pairs of pieces that meet at edges with more than two faces, most decided first, and whether one of them must be turned."""
     votes: dict[tuple[int, int], int] = {}
+    several = np.unique(edges.face[edges.degree[edges.edge] > 2])
+    _, same, count = np.unique(np.sort(faces[several], axis=1), axis=0, return_inverse=True, return_counts=True)
+    twin = np.zeros(len(faces), bool)
+    twin[several] = count[same.ravel()] > 1
     for k in np.flatnonzero(edges.degree > 2):
         half = np.arange(edges.start[k], edges.start[k + 1])
         face = edges.face[half]
@@ -51,10 +55,12 @@ def _many_sided(vertices: np.ndarray, faces: np.ndarray, edges: Edges, group: np
         side = away[length.argmax()] / (length.max() or 1.0)
         order = np.argsort(np.arctan2(away @ np.cross(axis, side), away @ side))
         runs = edges.forward[half] ^ turned[face]
+        agree = twin[face].any() and 2 * runs.sum() == len(runs)
         for i, j in zip(order, np.roll(order, -1), strict=True):
             p, q = int(group[face[i]]), int(group[face[j]])
             if p != q:
-                votes[min(p, q), max(p, q)] = votes.get((min(p, q), max(p, q)), 0) + (1 if runs[i] == runs[j] else -1)
+                vote = 1 if runs[i] == runs[j] and not agree else -1
+                votes[min(p, q), max(p, q)] = votes.get((min(p, q), max(p, q)), 0) + vote
     ranked = sorted((pair for pair in votes if votes[pair]), key=lambda pair: -abs(votes[pair]))
     a, b = (np.array([pair[k] for pair in ranked], int) for k in (0, 1))
     return a, b, np.array([votes[pair] > 0 for pair in ranked], bool)

@@ -130,7 +130,10 @@ def _meet(vertices: np.ndarray, joined: np.ndarray) -> np.ndarray:
 
 
 def _drop(faces: np.ndarray, report: RepairReport) -> np.ndarray:
-    """Drop triangles with a corner twice, and all but one of those with the same corners; both where two solids touch."""
+    """Drop triangles with a corner twice, and all but one of those with the same corners.
+
+    Both are dropped where two solids touch there, and both kept where two that overlap have the face in common.
+    """
     degenerate = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
     faces = faces[~degenerate]
     if not len(faces):
@@ -151,30 +154,35 @@ def _drop(faces: np.ndarray, report: RepairReport) -> np.ndarray:
     back = np.zeros(len(first), bool)
     back[group[~even]] = True
     opposed &= back
-    keep[first[_interfaces(faces[first], opposed)]] = False
+    keep[first[_shared(faces[first], opposed)]] = False
+    again = np.setdiff1d(np.arange(len(faces)), first)
+    again = again[np.unique(group[again], return_index=True)[1]]  # a second one of those that were there more than once
+    twins = np.zeros(len(first), bool)
+    twins[group[again]] = True
+    keep[again[_shared(faces[first], twins & ~opposed)[group[again]]]] = True
     for name, count in (("degenerate faces dropped", degenerate.sum()), ("duplicate faces dropped", (~keep).sum())):
         report.steps[name] = report.steps.get(name, 0) + int(count)
     return faces[keep]
 
 
-def _interfaces(faces: np.ndarray, opposed: np.ndarray) -> np.ndarray:
-    """Of faces that were there in both directions, those that part two solids: all around their rim two others meet."""
-    if not opposed.any() or opposed.all():
+def _shared(faces: np.ndarray, several: np.ndarray) -> np.ndarray:
+    """Of faces that were there several times, those that belong to two solids: all around their rim two others meet."""
+    if not several.any() or several.all():
         return np.zeros(len(faces), bool)
     edges = edges_of(faces)
     edge = edges.edge
-    own = np.bincount(edge, opposed[edges.face])
+    own = np.bincount(edge, several[edges.face])
     others = edges.degree - own
     inner = np.flatnonzero(own == 2)
-    halves = np.flatnonzero(opposed[edges.face])
+    halves = np.flatnonzero(several[edges.face])
     pairs = halves[np.isin(edge[halves], inner)]
     region, _, _ = link_items(len(faces), edges.face[pairs[0::2]], edges.face[pairs[1::2]])
     wrong = halves[(own[edge[halves]] != 2) & ((own[edge[halves]] != 1) | (others[edge[halves]] != 2))]
     rim = halves[(own[edge[halves]] == 1) & (others[edge[halves]] == 2)]
-    parting = np.zeros(len(faces), bool)
-    parting[region[edges.face[rim]]] = True
-    parting[region[edges.face[wrong]]] = False
-    return opposed & parting[region]
+    shared = np.zeros(len(faces), bool)
+    shared[region[edges.face[rim]]] = True
+    shared[region[edges.face[wrong]]] = False
+    return several & shared[region]
 
 
 def _mend_pieces(vertices, faces, kind, piece, asked, report) -> tuple[np.ndarray, np.ndarray]:

@@ -183,6 +183,16 @@ def test_small_pieces_that_face_the_other_way_are_found(seed):
     assert away.max() < np.sqrt(2.0 / np.sqrt(3.0) / 400)
 
 
+def test_overlapping_parts_with_a_whole_face_in_common_weigh_what_their_union_does():
+    frustum = box((1.0, 1.0, 1.0), (0, 0, 0))
+    frustum.vertices[frustum.vertices[:, 2] > 0.0] *= (0.5, 0.5, 1.0)
+    short, long = (trimesh.creation.cylinder(0.1, height).apply_translation((2.0, 0, 0.5 * height)) for height in (0.5, 0.8))
+    parts = [box((1.0, 1.0, 1.0), (0, 0, 0)), frustum, short, long]
+    body = sample_body(trimesh.util.concatenate(parts), radius=0.05, count=300)
+    assert body.volume == pytest.approx(1.0 + long.volume, rel=1e-9)
+    assert body.steps["holes closed"] == body.steps["sheets"] == 0
+
+
 @pytest.mark.parametrize("apart", [1e-7, 1e-6])
 def test_a_part_that_is_there_twice_weighs_once(apart):
     ring, block = trimesh.creation.torus(1.0, 0.2), box((1.0, 0.6, 0.4), (3.0, 0, 0))
