@@ -191,14 +191,14 @@ class Gaps:
     def _roomiest(self, gaps: np.ndarray) -> np.ndarray:
         """Gaps, or in place of those with a particle of another skin behind them, places beside them that are farther from it."""
         points, normals, free = self.places.points, self.places.normals, self.places.closest["way"]
-        room = np.minimum(free, self.places.own["way"])
-        roomy, chosen = np.flatnonzero(room > _LEAST), gaps.copy()
-        for n, k in enumerate(gaps):
-            if free[k] < _ROOM:
-                near = np.linalg.norm(points[roomy] - points[k], axis=1) < _NEAR * self.spacing
-                near = roomy[near & (normals[roomy] @ normals[k] > 0.5)]
-                if len(near):
-                    chosen[n] = near[room[near].argmax()]
+        room, chosen, narrow = np.minimum(free, self.places.own["way"]), gaps.copy(), np.flatnonzero(free[gaps] < _ROOM)
+        roomy = np.flatnonzero(room > _LEAST)
+        roomy = roomy[_near_cells(points[roomy], points[gaps[narrow]], _NEAR * self.spacing)]
+        for n in narrow:
+            near = np.linalg.norm(points[roomy] - points[gaps[n]], axis=1) < _NEAR * self.spacing
+            near = roomy[near & (normals[roomy] @ normals[gaps[n]] > 0.5)]
+            if len(near):
+                chosen[n] = near[room[near].argmax()]
         return chosen
 
     def beside(
