@@ -88,11 +88,6 @@ class Gaps:
         self.points = self.normals = np.empty((0, 3))
         self.places = Places(self.points, self.normals, *np.empty((2, 0), Nearest.numpy_dtype()), np.empty(0, bool))
 
-    @property
-    def _most(self) -> int:
-        """Gaps to be filled at once."""
-        return max(4, len(self.points) // 20)
-
     def look(self, points: np.ndarray, normals: np.ndarray) -> None:
         """Take note of particles, shape (n, 3) [m], and their normals; only near those that have moved is measured anew."""
         before = slice(len(self.points))
@@ -121,8 +116,7 @@ class Gaps:
         nearest = self.neighbour_distances()
         self._seek(random)
         places, free, excess = self.places, self.places.closest["way"], self.places.excess
-        lonely = np.argsort(-nearest, kind="stable")[: self._most]  # the loneliest
-        for i in lonely[nearest[lonely] > _LONELY]:
+        for i in np.flatnonzero(nearest > _LONELY):
             away = np.linalg.norm(places.points - self.points[i], axis=1) / self.spacing
             beside = np.flatnonzero((away > _BESIDE[0]) & (away < _BESIDE[1]))
             if len(beside):
@@ -182,7 +176,7 @@ class Gaps:
         enough = min(len(excess), np.count_nonzero(excess > 0.0) + (len(self.points) if crowded else 1))
         left = np.argpartition(-excess, enough - 1)[:enough]
         left = left[np.argsort(-excess[left], kind="stable")]
-        while len(left) and len(chosen) < (self._most if excess[left[0]] > 0.0 else crowded / 2):
+        while len(left) and len(chosen) < (max(4, len(self.points) // 20) if excess[left[0]] > 0.0 else crowded / 2):
             chosen.append(int(left[0]))
             away = np.linalg.norm(self.places.points[left] - self.places.points[left[0]], axis=1)
             left = left[away > _GAPS_APART * self.spacing]

@@ -1,7 +1,5 @@
 """Gaps between particles, and what a particle is needed for, against NumPy; also after some of them have moved."""
 
-import time
-
 import numpy as np
 import pytest
 import trimesh
@@ -76,17 +74,3 @@ def test_the_worst_gap_is_found_from_few_places(seed):
     gaps.judge(np.zeros(250, bool), random)
     assert known < worst - 0.02
     assert gaps.places.closest["way"].max() == pytest.approx(worst, abs=0.015)
-
-
-def test_many_lonely_particles_take_no_longer_than_the_gaps_that_are_filled():
-    random = np.random.default_rng(0)
-    gaps, (points, up), number = plane_gaps(40_000), scatter(random, 4000), 100_000
-    gaps.look(points, up)
-    gaps.add(*scatter(random, number), fixed=True)
-    begin = time.process_time()
-    for point in points[:100]:
-        np.linalg.norm(gaps.places.points - point, axis=1)
-    once = (time.process_time() - begin) / 100
-    begin = time.process_time()
-    gaps.judge(np.zeros(len(points), bool), random)
-    assert time.process_time() - begin < 0.15 * len(points) * once
