@@ -55,10 +55,10 @@ def test_grain_rolls_into_the_valley_and_rests(make_ground, tmp_path, kind):
         contact={"rolling": "spring"},
         numbers={"rolling_friction": 0.05},
     )
-    for _ in range(30):
+    for _ in range(60):
         world.step(round(0.1 / world.time_step))
         observation = world.observe()
-        if observation.health.fastest < 1e-6 and world.time > 0.5:
+        if observation.health.fastest < 1e-7 and world.time > 0.5:
             break
     x, y, z = observation.grains.position[0]
     assert abs(x - 0.1) < 0.01
