@@ -36,7 +36,8 @@ def play(tmp_path):
 
 def finish(process):
     _, errors = process.communicate(timeout=PATIENCE)
-    return process.returncode, errors
+    told = [line for line in errors.splitlines(keepends=True) if "waiting for" not in line]  # on a slow machine that comes first
+    return process.returncode, "".join(told)
 
 
 def test_it_comes_too_late_and_says_so(client, start_node, play):
