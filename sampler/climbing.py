@@ -10,14 +10,12 @@ _KNOWN = 20  # the worst places among which they are chosen, per start
 _FIRST, _SHORTER = 0.12, 0.7  # length of the first step, in spacings, and of each following one, of that before
 _TRIALS = 4  # places tried in each step
 
-Places = tuple[np.ndarray, np.ndarray]
-
 
 def climb(
     points: np.ndarray,
     normals: np.ndarray,
     found: np.ndarray,
-    beside: Callable[[np.ndarray, np.ndarray, tuple[float, ...]], Places],
+    beside: Callable[[np.ndarray, np.ndarray, tuple[float, ...]], tuple[np.ndarray, np.ndarray]],
     ways: Callable[[np.ndarray, np.ndarray], np.ndarray],
     steps: int,
     spacing: float,

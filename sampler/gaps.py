@@ -14,7 +14,7 @@ from sampler.skin import Skin
 _WATCHED = 0.15  # places that were found so near to being a gap are looked at the next time, too, in spacings
 _STEPS = 8  # from the worst places known to the worst ones near by
 _GAP = 0.785, 0.965  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
-_GRAVE, _WEIGHT = (0.785, 0.99), 4.0  # and from these ways on a grave one, which counts so much more
+_GRAVE, _WEIGHT = (0.785, 0.99), 4.0  # and from these ways on a grave one; that, and loneliness, counts so much more
 _GAPS_APART = 1.2  # gaps nearer than this to a deeper one wait, in spacings
 _ROOM, _NEAR = 0.55, 0.4  # a gap is filled so far from particles of other skins, or as far as can be so near to it; in spacings
 _LEAST, _TOO_NEAR = 0.40, 0.37  # particles nearer than this to one another are a fault, and a grave one, in spacings
@@ -121,7 +121,7 @@ class Gaps:
             beside = np.flatnonzero((away > _BESIDE[0]) & (away < _BESIDE[1]))
             if len(beside):
                 k = beside[free[beside].argmax()]
-                excess[k] = max(excess[k], 4.0 * (nearest[i] - _LONELY))
+                excess[k] = max(excess[k], _WEIGHT * (nearest[i] - _LONELY))
         crowded = np.flatnonzero(nearest < _LEAST)
         crowded = crowded[np.lexsort((nearest[crowded], pinned[crowded]))]
         gaps = self._worst(excess, len(crowded))
