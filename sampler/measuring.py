@@ -25,7 +25,8 @@ def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Eve
     gaps = Gaps(skin, lattice_spacing(float(skin.areas.sum()), len(points)))
     gaps.look(points, normals)
     random = np.random.default_rng(1)
-    places = skin.places(_MEASURED * len(points), gaps.spacing, random)
+    groups = skin.scatter(_MEASURED * len(points), random), skin.corners(gaps.spacing)
+    places = tuple(map(np.concatenate, zip(*groups, strict=True)))
     worst = [_worst_place(gaps, *places, found, along, random) for along, found in enumerate(gaps.measure(*places, _ENOUGH))]
     nearest = _neighbours(gaps)
     variation = nearest.std() / nearest.mean() if len(points) > 1 else 0.0

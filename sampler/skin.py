@@ -10,10 +10,11 @@ _STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what 
 _TRIAL = 4000  # random places that show whether anything is buried at all
 _DEEPEST = 400  # cuts through one triangle
 _ISLAND = 1.5  # triangles longer than this are halved, others cut along the planes that cross them; in spacings
-_TOGETHER = 0.15  # triangles nearer than this that look the same way lie together, in spacings
+_SHORT, _TOGETHER = 0.5, 0.15  # how far places on a triangle are apart, and which count as one, in spacings
 _NARROW = 1e-7  # of the diagonal: narrower triangles have no normal in single precision
 _THIRDS = (np.ones((3, 3)) + 3.0 * np.eye(3)) / 6.0  # places of a triangle, the middles of parts of it
 _CENTRE = np.ones((1, 3)) / 3.0
+_CORNERS = 0.01 + 0.97 * np.eye(3)  # places near its corners
 _MIDDLE = np.array([[0.36, 0.34, 0.3], [0.31, 0.36, 0.33]])  # near its middle, but hardly on edges of others
 _SLIT, _LARGE = 0.1, 0.5  # longest edge of the pieces at the ends of slits, and of those inside or beside them, in spacings
 _WIDE = 4.0  # triangles with longer edges, in roots of their area, are needles
@@ -39,22 +40,30 @@ class Skin(Surface):
         super().__init__(triangles, device)
         self.areas = self.areas if layers is None else self.areas / layers
 
-    def places(self, number: int, spacing: float, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """Places, shape (n, 3) [m], and the normals there, in reach of every gap between particles, also of one on a speck.
+    def scatter(self, number: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+        """Random places, shape (2 n, 3) [m], and the normals there: so many over the area, and over longest edges, for strips."""
+        edge = longest_edges(self.triangles)
+        groups = self.sample(number, random), self.sample(number, random, edge + edge.mean())
+        return tuple(map(np.concatenate, zip(*groups, strict=True)))
+
+    def corners(self, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+        """Places near corners, where gaps are widest, and on triangles that random places may miss, however small or narrow.
 
         Args:
-            number: of random places over the area, and of as many over the longest edges, for strips.
-            spacing: of the particles [m]; of triangles much smaller that lie together one has a place.
-            random: where chance comes from.
+            spacing: of the particles [m]; places much nearer to one another than that on one side are one.
+
+        Returns:
+            Shape (n, 3) [m], and the normals there, shape (n, 3).
         """
-        edge, middle = longest_edges(self.triangles), self.triangles.mean(axis=1)
-        side = np.abs(self.normals).argmax(axis=1)
-        up = np.take_along_axis(self.normals, side[:, None], axis=1)[:, 0] > 0.0
-        cell = ((middle - middle.min(axis=0)) / (_TOGETHER * spacing)).astype(np.int64)
+        row, face = _middle_lines(self.triangles, _SHORT * spacing)
+        points = np.concatenate([row, (_CORNERS @ self.triangles).reshape(-1, 3)])
+        normals = self.normals[np.append(face, np.repeat(np.arange(len(self.triangles)), 3))]
+        side = np.abs(normals).argmax(axis=1)
+        up = np.take_along_axis(normals, side[:, None], axis=1)[:, 0] > 0.0
+        cell = ((points - points.min(axis=0)) / (_TOGETHER * spacing)).astype(np.int64)
         key = np.ravel_multi_index((*cell.T, side, up), (*cell.max(axis=0) + 1, 3, 2))
         one = np.unique(key, return_index=True)[1]
-        groups = self.sample(number, random), self.sample(number, random, edge + edge.mean()), (middle[one], self.normals[one])
-        return tuple(np.concatenate(group) for group in zip(*groups, strict=True))
+        return points[one], normals[one]
 
     def sample(self, number: int, random: np.random.Generator, weight: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Random places, stratified over the area.
@@ -223,10 +232,32 @@ def _ask(points: np.ndarray, normals: np.ndarray, around: Surface) -> tuple[np.n
     return free, np.maximum(layers, 1)
 
 
+def _middle_lines(triangles: np.ndarray, apart: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places so far apart [m], or one, along triangles, halfway between their longest edge and the others.
+
+    Returns:
+        Shape (m, 3) [m]; the triangle that each lies on, shape (m,).
+    """
+    a, b, c = _longest_edge_first(triangles)
+    long = np.linalg.norm(b - a, axis=1)
+    foot = np.clip(np.einsum("ij,ij->i", c - a, b - a) / long**2, 1e-9, 1.0 - 1e-9)  # of the third corner on that edge
+    number = np.ceil(long / apart).astype(int)
+    face = np.repeat(np.arange(len(triangles)), number)
+    along = (0.5 + np.arange(len(face)) - np.repeat(np.cumsum(number) - number, number)) / number[face]
+    a, b, c, foot = a[face], b[face], c[face], foot[face]
+    high = np.minimum(along / foot, (1.0 - along) / (1.0 - foot))
+    return a + along[:, None] * (b - a) + 0.5 * high[:, None] * (c - a - foot[:, None] * (b - a)), face
+
+
 def halve_triangles(triangles: np.ndarray) -> np.ndarray:
     """Cut at the middle of the longest edge, so that thin triangles do not breed."""
-    edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
-    turn = (edge.argmax(axis=1)[:, None] + np.arange(3)) % 3
-    a, b, c = np.moveaxis(np.take_along_axis(triangles, turn[:, :, None], axis=1), 1, 0)
+    a, b, c = _longest_edge_first(triangles)
     middle = 0.5 * (a + b)
     return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+
+
+def _longest_edge_first(triangles: np.ndarray) -> np.ndarray:
+    """Corners of triangles, shape (n, 3, 3) [m], the longest edge from the first to the second; shape (3, n, 3)."""
+    edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
+    turn = (edge.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    return np.moveaxis(np.take_along_axis(triangles, turn[:, :, None], axis=1), 1, 0)

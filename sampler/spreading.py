@@ -67,10 +67,11 @@ def spread_particles(
         found = settle(*state.result())  # on an edge either face may be the nearest; judge by the final choice
         gaps.look(*found)
         if turn == 0:
-            gaps.add(*skin.places(_SAMPLED * number, state.spacing, random), fixed=True)
+            gaps.add(*skin.corners(state.spacing), fixed=True)
+            gaps.add(*skin.scatter(_SAMPLED * number, random), fixed=True)
         verdict = gaps.judge(state.pinned, random)
         if looks < _LOOKS and verdict.fault < (_FINE if looks else _HARDLY):  # a gap on a small piece may have had no place
-            gaps.add(*skin.places(_CONFIRMED * number, state.spacing, random))
+            gaps.add(*skin.scatter(_CONFIRMED * number, random))
             verdict = gaps.judge(state.pinned, random)
             looks, least = looks + 1, np.inf  # what was found before had not been looked at so closely
         stuck = 0 if verdict.fault < least else stuck + 1

@@ -212,8 +212,24 @@ def test_few_particles_do_not_make_the_mass_of_crossing_parts_worse(count):
 def test_a_speck_gets_a_place_on_each_of_its_sides():
     plate, speck = box((1.0, 1.0, 0.1), (0, 0, 0)), box((1e-4, 1e-4, 1e-4), (0, 0, 1.0))
     skin = Skin(np.concatenate([plate.triangles, speck.triangles]))
-    points, normals = skin.places(100, 0.05, np.random.default_rng(0))
+    points, normals = skin.corners(0.05)
     on = points[:, 2] > 0.9
-    assert len(points) < 250
+    assert np.count_nonzero(on) <= 12
     assert {tuple(normal) for normal in normals[on].round(6)} == {tuple(s * row) for s in (-1.0, 1.0) for row in np.eye(3)}
     assert np.allclose(skin.closest(points)[0], points, rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("third", [0.0, 0.3, 1.0])
+def test_corners_and_needles_have_places(third):
+    """Gaps are widest at corners, which random places meet seldom, and slivers are met hardly at all."""
+    needle = np.array([[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [third, 1e-4, 1.0]]])
+    plate = box((1.0, 1.0, 0.1), (0, 0, 0))
+    skin = Skin(np.concatenate([plate.triangles, needle]))
+    points, normals = skin.corners(0.05)
+    along = np.sort(points[points[:, 2] > 0.9, 0])
+    assert np.diff(along, prepend=0.0, append=1.0).max() < 0.6 * 0.05
+    for corner in (*needle[0], *plate.vertices):
+        assert np.linalg.norm(points - corner, axis=1).min() < 0.6 * 0.05
+    closest, face = skin.closest(points, up=normals)
+    assert np.allclose(closest, points, rtol=0.0, atol=1e-6)
+    assert np.allclose(skin.normals[face], normals)
