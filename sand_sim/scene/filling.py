@@ -1,6 +1,7 @@
 """Where the grains of a fill start: loosely packed in their region, or as a file says."""
 
 import csv
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from sand_sim import rotation
 from sand_sim.grain_table import GrainTable
 from sand_sim.scene.clumps import place_clumps
+from sand_sim.scene.npz import read_npz
 from sand_sim.scene.shapes import Shape, shape_named
 from sand_sim.scene.types import Fill, Material, SceneError, SizeDistribution
 from sand_sim.scene.walls import Wall
@@ -15,6 +17,14 @@ from sand_sim.scene.walls import Wall
 _GAP = 1.06  # lattice spacing over the largest diameter
 _JITTER = 0.4  # of the gap
 _POURED_FRACTION = 0.61  # of solid in a settled bed, a little high so that a fill by height can be struck off
+# What files of grains hold: arrays of an npz file, and the columns of a csv file that make them.
+_COLUMNS = {
+    "position": ("x", "y", "z"),
+    "radius": ("radius",),
+    "velocity": ("vx", "vy", "vz"),
+    "spin": ("wx", "wy", "wz"),
+    "orientation": ("qx", "qy", "qz", "qw"),
+}
 
 
 def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -> GrainTable:
@@ -125,68 +135,66 @@ def _table(position, radius, fill: Fill, material: Material, index: int, shape: 
 
 
 def _read_positions(fill: Fill, shape: Shape | None, material: Material, index: int) -> GrainTable:
-    """Grains from a file.
-
-    From npz: position, radius, optionally velocity, spin, orientation; from csv: x, y, z, radius, vx, vy, vz, wx, wy, wz, and
-    qx, qy, qz, qw.
-    """
+    """Grains from a file, of which only position and radius must be there, see ``_COLUMNS``."""
     path = Path(fill.file)
     where = f"fills: file '{path.name}' of '{fill.name}'"
     try:
-        columns = dict(np.load(path)) if path.suffix == ".npz" else _read_csv(path)
+        columns = (_read_arrays if path.suffix == ".npz" else _read_csv)(path)
     except OSError as error:
         raise SceneError(f"{where} cannot be read: {error.strerror or error}") from None
-    except ValueError as error:
+    except (ValueError, csv.Error) as error:
         raise SceneError(f"{where} is not a readable npz or csv file: {error}") from None
     for name in ("position", "radius"):
         if name not in columns:
             raise SceneError(f"{where} has no '{name}'; it has {', '.join(columns) or 'nothing'}")
-    position, radius = np.asarray(columns["position"], float), np.asarray(columns["radius"], float)
+    position, radius = columns.pop("position"), columns.pop("radius")
     if position.ndim != 2 or position.shape[1] != 3 or not len(position):
         raise SceneError(f"{where}: 'position' must have shape (n, 3) with n > 0, got {position.shape}")
     number = len(position)
     if radius.shape != (number,):
         raise SceneError(f"{where}: 'radius' must have shape ({number},), got {radius.shape}")
-    given = {}
-    for name, width in (("velocity", 3), ("spin", 3), ("orientation", 4)):
-        if name in columns:
-            given[name] = np.asarray(columns[name], float)
-            if given[name].shape != (number, width):
-                raise SceneError(f"{where}: '{name}' must have shape ({number}, {width}), got {given[name].shape}")
-    for name, values in (("position", position), ("radius", radius), *given.items()):
+    for name, values in columns.items():
+        if values.shape != (number, width := len(_COLUMNS[name])):
+            raise SceneError(f"{where}: '{name}' must have shape ({number}, {width}), got {values.shape}")
+    for name, values in (("position", position), ("radius", radius), *columns.items()):
         if not np.all(np.isfinite(values)):
             raise SceneError(f"{where}: '{name}' has values that are not finite")
     if np.any(radius <= 0.0):
         raise SceneError(f"{where}: 'radius' must be positive [m], the smallest is {radius.min():g}")
-    turns = given.pop("orientation", np.tile([0.0, 0.0, 0.0, 1.0], (number, 1)))
+    turns = columns.pop("orientation", np.tile([0.0, 0.0, 0.0, 1.0], (number, 1)))
     lengths = np.linalg.norm(turns, axis=1)
     if np.any(lengths < 1e-6):
         raise SceneError(f"{where}: 'orientation' must not be the zero quaternion; 0, 0, 0, 1 is no rotation")
-    return _table(position, radius, fill, material, index, shape, turns / lengths[:, None], **given)
+    return _table(position, radius, fill, material, index, shape, turns / lengths[:, None], **columns)
+
+
+def _read_arrays(path: Path) -> dict[str, np.ndarray]:
+    columns = read_npz(path)
+    _refuse_unknown(columns, _COLUMNS)
+    return {name: np.asarray(values, float) for name, values in columns.items()}
 
 
 def _read_csv(path: Path) -> dict[str, np.ndarray]:
-    with path.open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        rows = list(csv.DictReader(file, restkey="", restval=""))
     if not rows:
         return {}
     names = {name.strip(): name for name in rows[0]}
-
-    def column(*wanted):
-        return np.column_stack([[float(row[names[name]]) for row in rows] for name in wanted])
-
+    _refuse_unknown(names, sum(_COLUMNS.values(), ()))
     columns = {}
-    for key, wanted in (
-        ("position", ("x", "y", "z")),
-        ("velocity", ("vx", "vy", "vz")),
-        ("spin", ("wx", "wy", "wz")),
-        ("orientation", ("qx", "qy", "qz", "qw")),
-    ):
+    for key, wanted in _COLUMNS.items():
         missing = [name for name in wanted if name not in names]
         if not missing:
-            columns[key] = column(*wanted)
+            columns[key] = np.column_stack([[float(row[names[name]]) for row in rows] for name in wanted])
         elif len(missing) < len(wanted):
             raise ValueError(f"of the columns {', '.join(wanted)} it lacks {', '.join(missing)}")
-    if "radius" in names:
-        columns["radius"] = column("radius")[:, 0]
+    if "radius" in columns:
+        columns["radius"] = columns["radius"][:, 0]
     return columns
+
+
+def _refuse_unknown(names: Iterable[str], known: Iterable[str]) -> None:
+    """A column of which the name is misspelt would be left out in silence."""
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise ValueError(f"unknown column '{unknown[0]}'; known are {', '.join(known)}; rename it or leave it out")

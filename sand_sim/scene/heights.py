@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sand_sim.scene.npz import read_npz
 from sand_sim.scene.types import SceneError
 
 
@@ -35,10 +36,10 @@ def read_heights(path: Path) -> np.ndarray:
 
 
 def _read_npz(path: Path) -> np.ndarray:
-    with np.load(path) as columns:
-        if "heights" not in columns:
-            raise SceneError(f"{path.name} has no array 'heights'; it has {', '.join(columns) or 'nothing'}")
-        return np.asarray(columns["heights"], float)
+    columns = read_npz(path)
+    if "heights" not in columns:
+        raise SceneError(f"{path.name} has no array 'heights'; it has {', '.join(columns) or 'nothing'}")
+    return np.asarray(columns["heights"], float)
 
 
 def _read_csv(path: Path) -> np.ndarray:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sand_sim.scene.npz import read_npz
 from sand_sim.scene.types import SceneError
 
 SPHERE, TETRAHEDRON = "sphere", "tetrahedron"
@@ -134,8 +135,8 @@ def read_shape(path: Path) -> Shape:
     """
     try:
         if path.suffix == ".npz":
-            with np.load(path) as file:
-                centres, radii = np.asarray(file["position"], float), np.asarray(file["radius"], float)
+            columns = read_npz(path)
+            centres, radii = np.asarray(columns["position"], float), np.asarray(columns["radius"], float)
         else:
             with path.open(newline="") as file:
                 rows = [{k.strip(): float(v) for k, v in row.items()} for row in csv.DictReader(file)]

@@ -108,6 +108,7 @@ def test_mesh_terrain_lies_at_its_pose(make_ground, tmp_path):
     [
         (lambda path: None, "boundaries: heights of terrain 'ground': ground.npz cannot be read"),
         (lambda path: path.write_bytes(b"no zip"), "ground.npz is not a readable npz file"),
+        (lambda path: path.write_bytes(b"PK\x03\x04 and cut off"), "ground.npz is not a readable npz file"),
         (lambda path: np.savez(path, ground=valley()), "ground.npz has no array 'heights'; it has ground"),
         (lambda path: np.savez(path, heights=np.ones(4)), "ground.npz must hold at least 2 rows of 2 heights, got shape (4,)"),
         (lambda path: np.savez(path, heights=np.full((2, 2), np.nan)), "ground.npz has heights that are not finite"),

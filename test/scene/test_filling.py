@@ -129,6 +129,11 @@ def test_positions_come_from_files(tmp_path, kind):
         ({"position": np.ones((2, 3)), "radius": -np.ones(2)}, "'radius' must be positive"),
         ({"position": np.ones((2, 3)), "radius": np.ones(3)}, "'radius' must have shape (2,)"),
         ({"position": np.ones((2, 3)), "radius": np.ones(2), "velocity": np.ones((3, 3))}, "'velocity' must have shape (2, 3)"),
+        ({"position": np.ones((2, 3)), "radius": ["1", "wide"]}, "could not convert string to float"),
+        (
+            {"position": np.ones((2, 3)), "radius": np.ones(2), "velocities": np.ones((2, 3))},
+            "unknown column 'velocities'; known are position, radius, velocity, spin, orientation; rename it or leave it out",
+        ),
     ],
 )
 def test_bad_position_files_are_refused(tmp_path, columns, named):
@@ -140,7 +145,14 @@ def test_bad_position_files_are_refused(tmp_path, columns, named):
 
 
 @pytest.mark.parametrize(
-    ("name", "content"), [("grains.npz", "text"), ("grains.csv", "x,y,z,radius\n1,2,three,4\n"), ("none.csv", None)]
+    ("name", "content"),
+    [
+        ("grains.npz", "text"),
+        ("grains.npz", "PK\x03\x04 and cut off"),
+        ("grains.csv", "x,y,z,radius\n1,2,three,4\n"),
+        ("grains.csv", "x,y,z,radius\n1,2,3\n"),
+        ("none.csv", None),
+    ],
 )
 def test_unreadable_position_files_are_refused(tmp_path, name, content):
     if content is not None:
@@ -149,8 +161,16 @@ def test_unreadable_position_files_are_refused(tmp_path, name, content):
         fill_grains(Fill("bed", "sand", file=tmp_path / name), SAND, 0, [])
 
 
-def test_a_velocity_with_a_column_missing_is_refused(tmp_path):
-    """It would start at rest instead."""
-    (tmp_path / "grains.csv").write_text("x,y,z,radius,vx,vz\n0,0,0,0.005,1,2\n")
-    with pytest.raises(SceneError, match=r"grains\.csv.* lacks vy"):
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        ("x,y,z,radius,vx,vz\n0,0,0,0.005,1,2\n", "it lacks vy"),
+        ("x,y,z,radius,vx,vy,Vz\n0,0,0,0.005,1,2,3\n", "unknown column 'Vz'"),
+        ("x,y,z,radius\n0,0,0,0.005,1\n", "unknown column ''"),
+    ],
+)
+def test_columns_that_would_be_left_out_are_refused(tmp_path, content, named):
+    """Grains would start at rest instead."""
+    (tmp_path / "grains.csv").write_text(content)
+    with pytest.raises(SceneError, match=rf"grains\.csv.* {named}"):
         fill_grains(Fill("bed", "sand", file=tmp_path / "grains.csv"), SAND, 0, [])
