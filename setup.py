@@ -13,7 +13,7 @@ setup(
     name=NAME,
     version="0.1.0",
     description="Robots digging and scooping sand, grain by grain, on any CPU or a GPU, driven by ROS 2 topics",
-    long_description=Path(__file__).resolve().with_name("README.md").read_text(),
+    long_description=Path(__file__).resolve().with_name("README.md").read_text(encoding="utf-8"),
     long_description_content_type="text/markdown",
     license="Apache-2.0",
     license_files=["LICENSE"],

@@ -112,5 +112,5 @@ def _of_package(real: Path, package: str) -> bool:
     for folder in real.parents:
         manifest = folder / "package.xml"
         if manifest.is_file():
-            return re.search(rf"<name>\s*{re.escape(package)}\s*</name>", manifest.read_text(errors="replace")) is not None
+            return re.search(rf"<name>\s*{re.escape(package)}\s*</name>", manifest.read_text("utf-8", "replace")) is not None
     return False

@@ -42,7 +42,7 @@ BELOW = {
 
 def imports(path):
     """Absolute names of all modules that a file imports."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -83,7 +83,7 @@ def test_imports_point_one_way(path):
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_kernel_constants_are_exact(path):
     """Warp rounds ``real(0.1)`` to single precision even where real is double; such constants must be quotients."""
-    for literal in re.findall(r"\breal\(([^()]*)\)", path.read_text()):
+    for literal in re.findall(r"\breal\(([^()]*)\)", path.read_text(encoding="utf-8")):
         if re.fullmatch(r"-?[0-9.]+(e-?[0-9]+)?", literal):
             value = float(literal)
             assert (value == float(f"{value:.7g}") and (value * 2**20).is_integer()) or literal in ALLOWED, literal
@@ -95,12 +95,12 @@ ALLOWED = {"1.05"}  # growth of cells, not physics
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_files_are_small(path):
-    assert len(path.read_text().splitlines()) <= 330
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 330
 
 
 def fields_without_unit(module):
     """Float and vector fields of a module's dataclasses whose line or docstring entry shows no [unit]."""
-    source = Path(module.__file__).read_text().splitlines()
+    source = Path(module.__file__).read_text(encoding="utf-8").splitlines()
     for kind in vars(module).values():
         if not (isinstance(kind, type) and dataclasses.is_dataclass(kind) and kind.__module__ == module.__name__):
             continue
@@ -133,5 +133,5 @@ def test_laws_have_source_and_test(slot, name):
     text = SLOTS[slot][name].build.__doc__
     assert "Source: " in text
     assert "``F" in text or "``M" in text
-    tests = "".join(path.read_text() for path in (ROOT / "test").rglob("test_*.py"))
+    tests = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "test").rglob("test_*.py"))
     assert name == getattr(ContactModel(), slot) or f'"{slot}": "{name}"' in tests

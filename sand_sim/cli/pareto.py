@@ -52,7 +52,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb."""
     console, path = Console(), find_scene(options.scene)
     scene = load_scene(path)
-    whole = yaml.safe_load(path.read_text())
+    whole = yaml.safe_load(path.read_text(encoding="utf-8"))
     facts = Facts.of(scene)
     preparation = prepare(path, scene, facts.grains, options.quantity)
     shortenings = [preparation.shortening] + ([preparation.quick] if options.quick else [])

@@ -62,7 +62,7 @@ def load_scene(path: str | Path) -> Scene:
     """
     path = Path(path)
     try:
-        parsed = yaml.load(path.read_text(), _Loader)
+        parsed = yaml.load(path.read_text(encoding="utf-8"), _Loader)
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:

@@ -138,7 +138,7 @@ def read_shape(path: Path) -> Shape:
             columns = read_npz(path)
             centres, radii = np.asarray(columns["position"], float), np.asarray(columns["radius"], float)
         else:
-            with path.open(newline="") as file:
+            with path.open(newline="", encoding="utf-8-sig") as file:
                 rows = [{k.strip(): float(v) for k, v in row.items()} for row in csv.DictReader(file)]
             centres = np.array([[row[axis] for axis in "xyz"] for row in rows]).reshape(-1, 3)
             radii = np.array([row["radius"] for row in rows])

@@ -19,14 +19,14 @@ def write_scene(source: Path, edited: dict, path: Path) -> bool:
     Returns:
         Whether comments and layout were kept; where an entry cannot be changed in its place the whole file is written anew.
     """
-    text, edited = source.read_text(), _moved(edited, source.parent, path.parent)
+    text, edited = source.read_text(encoding="utf-8"), _moved(edited, source.parent, path.parent)
     try:
         changed = change_text(text, edited)
         kept = yaml.safe_load(changed) == edited
     except (ValueError, yaml.YAMLError):
         kept = False
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(changed if kept else yaml.safe_dump(edited, sort_keys=False))
+    path.write_text(changed if kept else yaml.safe_dump(edited, sort_keys=False), encoding="utf-8")
     return kept
 
 
