@@ -66,7 +66,8 @@ def load_scene(path: str | Path) -> Scene:
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise SceneError(f"{path}: is not valid YAML: {' '.join(str(error).split())}") from None
+        told = " ".join(str(error).split()).replace('in "<unicode string>", ', "in ")  # the file is named before it
+        raise SceneError(f"{path}: is not valid YAML: {told}") from None
     try:
         return read_scene(parsed, path.resolve().parent)
     except SceneError as error:

@@ -112,8 +112,8 @@ def test_refusals_name_the_field_and_the_fix(path, value, named):
         ("- 1\n- 2", "must be a mapping"),
         ("", "must be a mapping"),
         ("\x00", "is not valid YAML"),
-        ("tools:\n  spade: {}\n  spade: {}", "'spade' is there twice in \"<unicode string>\", line 3"),
-        ("duration: 1\nname: a\nduration: 2", "'duration' is there twice in \"<unicode string>\", line 3"),
+        ("tools:\n  spade: {}\n  spade: {}", "'spade' is there twice in line 3, column 3"),
+        ("duration: 1\nname: a\nduration: 2", "'duration' is there twice in line 3, column 1"),
     ],
 )
 def test_unreadable_files_are_refused_in_one_line(tmp_path, content, named):
