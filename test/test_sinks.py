@@ -207,7 +207,7 @@ def listener():
     from sand_sim.sinks.viewer import _listens
 
     begin = time.monotonic()
-    while not _listens(PORT):
+    while not _listens():
         assert time.monotonic() - begin < 60.0
         time.sleep(0.1)
     return process
@@ -221,7 +221,7 @@ def end(process):
 @pytest.mark.xdist_group("processes")
 def test_a_viewer_may_be_killed_and_come_back(world, monkeypatch):
     monkeypatch.setattr("sand_sim.sinks.viewer.open_viewer", lambda: True)
-    monkeypatch.setattr("sand_sim.sinks.viewer.Viewer.__init__.__defaults__", (PORT,))
+    monkeypatch.setattr("sand_sim.sinks.viewer.PORT", PORT)
     told, viewer = [], listener()
     try:
         recorder = Recorder(world, view=True, report=told.append)

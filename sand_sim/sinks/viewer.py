@@ -28,7 +28,6 @@ class Viewer:
         world: that is drawn.
         particles: draw the particles of tools.
         identity: of the recording.
-        port: on this machine.
 
     Attributes:
         trouble: why it is not fed at present, empty if it is.
@@ -37,9 +36,9 @@ class Viewer:
 
     path, finished = None, ()
 
-    def __init__(self, world: World, particles: bool, identity: str, port: int = PORT):
+    def __init__(self, world: World, particles: bool, identity: str):
         self.trouble = ""
-        self._world, self._particles, self._identity, self._port = world, particles, identity, port
+        self._world, self._particles, self._identity = world, particles, identity
         self._stream: rr.RecordingStream | None = None
         self._looked = 0.0
         self._look()
@@ -68,34 +67,34 @@ class Viewer:
                 if "timed out" not in str(error):  # else it is only busy
                     self._stream.disconnect()
                     self._stream = None
-        elif _listens(self._port):
+        elif _listens():
             self._stream = rr.RecordingStream("sand_sim", recording_id=self._identity)
-            self._stream.set_sinks(rr.GrpcSink(f"rerun+http://{_HOST}:{self._port}/proxy"))
+            self._stream.set_sinks(rr.GrpcSink(f"rerun+http://{_HOST}:{PORT}/proxy"))
             self._drawing = Drawing(self._world, self._stream, self._particles)
-        self.trouble = "" if self._stream else f"nobody listens on {_HOST}:{self._port}"
+        self.trouble = "" if self._stream else f"nobody listens on {_HOST}:{PORT}"
 
 
-def open_viewer(port: int = PORT) -> bool:
+def open_viewer() -> bool:
     """Open a viewer and wait until it can be sent to; it stays open when we end.
 
     Returns:
         Whether one could be opened; not so, for example, without a screen.
     """
     # Rerun's own spawn helper listens on all interfaces.
-    command = [sys.executable, "-m", "rerun", "--bind", _HOST, "--port", str(port)]
+    command = [sys.executable, "-m", "rerun", "--bind", _HOST, "--port", str(PORT)]
     viewer = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     end = time.monotonic() + _PATIENCE
     while time.monotonic() < end and viewer.poll() is None:
-        if _listens(port):
+        if _listens():
             time.sleep(_PROBATION)
             break
         time.sleep(0.1)
     return viewer.poll() is None
 
 
-def _listens(port: int) -> bool:
+def _listens() -> bool:
     try:
-        socket.create_connection((_HOST, port), timeout=0.2).close()
+        socket.create_connection((_HOST, PORT), timeout=0.2).close()
     except OSError:
         return False
     return True
