@@ -93,9 +93,7 @@ def confined(
     yield Check("energy gained / that stored", after.gained / stored, 0.0, 0.005, "conservation")
 
 
-def bed(
-    bench: Bench, young: float = 1e7, friction: float = 0.5, gravity: float = 9.81, restitution: float = 0.3, layers: int = 6
-) -> Iterator[Check]:
+def bed(bench: Bench, young: float = 1e7, friction: float = 0.5, gravity: float = 9.81, layers: int = 6) -> Iterator[Check]:
     """Grains fall a little and come to rest in a box: the floor carries their weight."""
     points = lattice((5, 5, layers), 2.02 * _RADIUS, (1.05 * _RADIUS,) * 3)
     points[:, :2] += np.random.default_rng(2).uniform(-0.02, 0.02, (len(points), 2)) * _RADIUS
@@ -107,7 +105,7 @@ def bed(
         grain={"young": young},
         wall={"young": young},
         friction=friction,
-        restitution=restitution,
+        restitution=0.3,
         boundaries=[box([0, 0, 0], [side, side, 2.5 * layers * _RADIUS])],
     )
     run_for(world, (20.0 if friction else 60.0) * np.sqrt(_RADIUS / gravity))  # without friction they keep finding better places

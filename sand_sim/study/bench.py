@@ -84,10 +84,9 @@ def run_for(world: World, time: float) -> None:
     world.step(max(1, int(np.ceil(time / world.time_step))))
 
 
-def plane(height: float = 0.0, normal=(0.0, 0.0, 1.0), point=None) -> dict:
-    """An entry of ``boundaries``: a plane, horizontal at a height [m] unless said otherwise."""
-    at = [0.0, 0.0, height] if point is None else [float(c) for c in point]
-    return {"type": "plane", "name": "floor", "material": "wall", "point": at, "normal": list(normal)}
+def plane(height: float = 0.0) -> dict:
+    """An entry of ``boundaries``: a level plane at a height [m]."""
+    return {"type": "plane", "name": "floor", "material": "wall", "point": [0.0, 0.0, height], "normal": [0.0, 0.0, 1.0]}
 
 
 def box(low, high, **further) -> dict:
