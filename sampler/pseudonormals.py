@@ -17,7 +17,7 @@ class Pseudonormals:
 
     def __init__(self, triangles: np.ndarray):
         self._triangles, self._normal = triangles, Surface.normals_of(triangles)
-        _, vertex = np.unique(merge_points(triangles.reshape(-1, 3), 0.0), return_inverse=True)
+        _, vertex = np.unique(merge_points(triangles.reshape(-1, 3)), return_inverse=True)
         self._faces = vertex.reshape(-1, 3)
         self._at_vertex = np.zeros((int(vertex.max()) + 1, 3))
         for k in range(3):

@@ -139,7 +139,7 @@ def closing_cones(triangles: np.ndarray) -> np.ndarray:
     cells twice as wide, and so on. So the cones are small, and seen from farther away next to nothing.
     """
     corners = triangles.reshape(-1, 3)
-    _, first, vertex = np.unique(merge_points(corners, 0.0), return_index=True, return_inverse=True)
+    _, first, vertex = np.unique(merge_points(corners), return_index=True, return_inverse=True)
     edges = edges_of(vertex.reshape(-1, 3))
     surplus = np.bincount(edges.edge, np.where(edges.forward, 1, -1)).astype(int)
     surplus[edges.ends[:, 0] == edges.ends[:, 1]] = 0

@@ -85,7 +85,7 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     check_mesh(mesh)
     report = RepairReport()
     vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64)
-    same = merge_points(vertices, 0.0)
+    same = merge_points(vertices)
     report.steps["vertices merged"] = int((same != np.arange(len(same))).sum())
     faces = _drop(same[faces], report)
     sewn = sew_edges(vertices, faces)
@@ -145,7 +145,7 @@ def _drop(faces: np.ndarray, report: RepairReport) -> np.ndarray:
     if number < 2_000_000:  # the product fits 64 bits
         key = (corners[:, 0] * number + corners[:, 1]) * number + corners[:, 2]
     else:
-        key = merge_points(corners.astype(float), 0.0)
+        key = merge_points(corners.astype(float))
     _, first, group = np.unique(key, return_index=True, return_inverse=True)
     keep = np.zeros(len(faces), bool)
     keep[first] = True

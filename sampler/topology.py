@@ -120,20 +120,15 @@ def link_items(number: int, a: np.ndarray, b: np.ndarray, turn: np.ndarray | Non
     return group, turned.astype(bool), int(clash.numpy()[0])
 
 
-def merge_points(points: np.ndarray, tolerance: float) -> np.ndarray:
-    """First of the points equal to each one after rounding to a tolerance, shape (n,).
-
-    Args:
-        points: shape (n, 3) [m].
-        tolerance: [m]; 0 merges identical points only.
-    """
-    rounded = np.round(points / tolerance) if tolerance else points + 0.0  # -0.0 becomes 0.0
-    bits = np.ascontiguousarray(rounded, np.float64).view(np.uint64)
+def merge_points(points: np.ndarray) -> np.ndarray:
+    """First of the points, shape (n, 3) [m], that are identical to each one, shape (n,)."""
+    points = points + 0.0  # -0.0 becomes 0.0
+    bits = np.ascontiguousarray(points, np.float64).view(np.uint64)
     factors = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
     mixed = bits * factors
     mixed ^= mixed >> np.uint64(29)
     key = (mixed * np.array([3, 5, 7], np.uint64)).sum(axis=1, dtype=np.uint64)
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
     same = first[inverse]
-    different = np.any(rounded[same] != rounded, axis=1)  # two points of one key: next to impossible, then kept apart
+    different = np.any(points[same] != points, axis=1)  # two points of one key: next to impossible, then kept apart
     return np.where(different, np.arange(len(points)), same)
