@@ -48,14 +48,12 @@ class RepairedMesh:
         vertices: shape (n, 3) [m].
         faces: outward, shape (m, 3).
         kind: of each face, ``SOLID``, ``CAP`` (closes a hole, not in the file) or ``SHEET``, shape (m,).
-        closed: all solids are closed, so that their winding numbers are whole.
         report: what was done.
     """
 
     vertices: np.ndarray
     faces: np.ndarray
     kind: np.ndarray
-    closed: bool
     report: RepairReport
 
     @property
@@ -107,7 +105,6 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
         taken = sheet if enclosing else crumbs
         sheet = sheet & ~taken
         report.warnings.append(f"{taken.sum()} open pieces are taken for parts of one cracked surface")
-        enclosing = True
     kind = np.where(sheet[component], SHEET, SOLID)
     report.steps["holes closed"] = round(float((1.0 / (corners[keep] - 2)).sum()))  # a loop of n corners takes n - 2 faces
     report.steps["sheets"] = int(sheet.sum())
@@ -120,7 +117,7 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
         faces, kind = _mend_pieces(vertices, faces, kind, piece, asked, report)
     large = Surface.areas_of(vertices[caps[keep & (corners > 3)]]).sum()
     _warn(report, float(large / area.sum()), int((keep & (corners > 3)).sum()), clashes)
-    return RepairedMesh(vertices, faces, kind, not enclosing, report)
+    return RepairedMesh(vertices, faces, kind, report)
 
 
 def _meet(vertices: np.ndarray, joined: np.ndarray) -> np.ndarray:

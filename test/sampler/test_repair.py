@@ -86,7 +86,7 @@ def test_cracks_of_a_ten_thousandth_cost_hardly_any_volume(seed):
     triangles = np.array(pipe.triangles)
     triangles += np.random.default_rng(seed).uniform(-1e-4, 1e-4, triangles.shape) * np.linalg.norm(pipe.extents)
     repaired = repair_mesh(loose(triangles))
-    assert repaired.closed
+    assert not any("cracked" in warning for warning in repaired.report.warnings)
     assert not repaired.report.steps["sheets"]
     assert integrate(repaired.triangles)[0] == pytest.approx(pipe.volume, rel=1e-3)
 
