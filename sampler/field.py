@@ -1,6 +1,5 @@
 """The signed distance on a sparse grid near the surface, as plain arrays that any kernel can sample."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,7 +80,6 @@ def make_field(
     band: float,
     cell: float | None = None,
     memory: int = 256 << 20,
-    progress: Callable[[float], None] = lambda share: None,
 ) -> DistanceField:
     """Evaluate a distance on blocks near its surface.
 
@@ -90,7 +88,6 @@ def make_field(
         band: distance from the surface up to which values are needed [m], for a tool the largest grain's radius and more.
         cell: edge of a cell [m]; half the thinnest wall, and at most half the band, if None.
         memory: most to take [bytes]; cells grow until it suffices, see ``DistanceField.resolves_walls``.
-        progress: called with the share of the work done, 0 to 1.
     """
     wall = thinnest_wall(distance.surface)
     cell = min(0.5 * wall, 0.5 * band) if cell is None else cell
@@ -116,7 +113,6 @@ def make_field(
         part = near[first : first + _TOGETHER]
         places = low + cell * (BLOCK * part[:, None] + node)
         values[first : first + len(part)] = distance.query(places.reshape(-1, 3))[0].reshape(-1, _NODES, _NODES, _NODES)
-        progress((first + len(part)) / len(near))
     return DistanceField(low, cell, band, block, values, wall)
 
 
