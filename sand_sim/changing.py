@@ -11,7 +11,6 @@ from sand_sim.carrying_over import carry_over, rebuild
 from sand_sim.exchange import check_room, find_grains, read_grains
 from sand_sim.grain_table import GrainTable
 from sand_sim.observing import balance_rounding, observe_grains, observe_spheres
-from sand_sim.scene.stable_step import DEEP
 from sand_sim.tool_exchange import check_tool, read_tool
 
 
@@ -64,7 +63,7 @@ class Changeable:
         self._go_on_with(self.assembly)
         return gone
 
-    def set_tool_mesh(self, tool: str, mesh: str, scale: float = 1.0, overlap: float = DEEP) -> None:
+    def set_tool_mesh(self, tool: str, mesh: str, scale: float = 1.0) -> None:
         """Give a tool another body at the pose it has; what it does and has done stays, ``reset`` brings the first one back.
 
         If it reaches farther than any tool before, positions are rounded anew, to a coarser lattice (see ``lattice.py``).
@@ -73,16 +72,15 @@ class Changeable:
             tool: name.
             mesh: file, or address as in a scene.
             scale: [m per mesh unit].
-            overlap: share of a grain's radius by which the new body may cut deeper into it than the present one [1].
 
         Raises:
-            CommandError: if the mesh cannot be used, or cuts deeper into grains; nothing is changed then.
+            CommandError: if the mesh cannot be used, or cuts deeper into grains by a tenth of a radius; nothing is changed then.
         """
         index = self._index_of(tool)
         self._health()
         model = read_tool(self.assembly, self.tools[index].tool, mesh, scale)
         tools = [*self.tools[:index], model, *self.tools[index + 1 :]]
-        check_tool(self.assembly, tools, index, self._poses[index], observe_spheres(self.assembly), overlap)
+        check_tool(self.assembly, tools, index, self._poses[index], observe_spheres(self.assembly))
         self._sweep()
         self._models[index, model.tool.mesh, model.tool.scale] = model
         other = rebuild(self.assembly, self.assembly.table, tools)

@@ -8,6 +8,7 @@ from sampler import MeshError, locate_mesh, read_mesh
 from sand_sim.assemble import Assembly
 from sand_sim.border import CommandError, GrainCloud
 from sand_sim.clearance import as_at_start
+from sand_sim.scene.stable_step import DEEP
 from sand_sim.scene.types import SceneError, Tool
 from sand_sim.tool_model import ToolModel, model_tool, with_mesh
 
@@ -38,7 +39,7 @@ def read_tool(assembly: Assembly, tool: Tool, mesh: str, scale: float) -> ToolMo
         raise CommandError("bad_mesh", str(error)) from None
 
 
-def check_tool(assembly: Assembly, tools: list[ToolModel], index: int, pose: tuple, spheres: GrainCloud, overlap: float) -> None:
+def check_tool(assembly: Assembly, tools: list[ToolModel], index: int, pose: tuple, spheres: GrainCloud) -> None:
     """See that a tool can take the place of another.
 
     Args:
@@ -47,10 +48,9 @@ def check_tool(assembly: Assembly, tools: list[ToolModel], index: int, pose: tup
         index: which of them is new.
         pose: position [m] and orientation of the tool now.
         spheres: from ``observe_spheres``.
-        overlap: share of a grain's radius by which it may cut deeper into it than the present one does [1].
 
     Raises:
-        CommandError: if it cuts deeper, or asks for a smaller time step.
+        CommandError: if it cuts deeper into a grain by more than ``DEEP`` of its radius, or asks for a smaller time step.
     """
     model, step = tools[index], assembly.time_step
     name = f"tool '{model.tool.name}'"
@@ -67,11 +67,11 @@ def check_tool(assembly: Assembly, tools: list[ToolModel], index: int, pose: tup
     there = as_at_start(spheres.position[near], model.tool.pose, pose)
     was, now = (1.0 - one.distance(there) / radius[near] for one in (assembly.tools[index], model))
     deeper = now - np.maximum(was, 0.0)
-    blocked = deeper > overlap
+    blocked = deeper > DEEP
     if blocked.any():
         place = spheres.position[near[np.argmax(deeper)]].round(4).tolist()
         raise CommandError(
             "blocked",
-            f"{name}: the new mesh cuts into {blocked.sum()} grains by more than {overlap:g} of a radius, the deepest at {place} "
+            f"{name}: the new mesh cuts into {blocked.sum()} grains by more than {DEEP:g} of a radius, the deepest at {place} "
             f"m by {deeper.max():.2g}; move the tool away first",
         )
