@@ -56,23 +56,14 @@ def bed_grid(scene, cloud: GrainCloud, cell: float | None = None) -> tuple[np.nd
     return low, cell, shape
 
 
-def make_height_map(
-    cloud: GrainCloud,
-    low: np.ndarray,
-    cell: float,
-    shape: tuple[int, int],
-    floor: float = np.nan,
-    left_out: np.ndarray | None = None,
-) -> HeightMap:
-    """Top of the highest sphere over the middle of each cell.
+def make_height_map(cloud: GrainCloud, low: np.ndarray, cell: float, shape: tuple[int, int]) -> HeightMap:
+    """Top of the highest sphere over the middle of each cell; NaN where there is none.
 
     Args:
         cloud: spheres, best ``Observation.spheres``, so that bodies show their shape.
         low: lower corner of the grid, shape (2,) [m].
         cell: edge of a cell [m].
         shape: rows (along y) and columns (along x).
-        floor: height where there is no grain [m].
-        left_out: grains that do not count, as those that a tool carries (``ToolModel.holds``), shape (n,), bool.
 
     Raises:
         ValueError: if cell or shape are not positive.
@@ -80,8 +71,7 @@ def make_height_map(
     rows, columns = shape
     if not (cell > 0.0 and rows > 0 and columns > 0):
         raise ValueError(f"height map: cell and shape must be positive, not {cell} and {shape}")
-    chosen = slice(None) if left_out is None else ~np.asarray(left_out)
-    place, radius = cloud.position[chosen], cloud.radius[chosen].astype(float)
+    place, radius = cloud.position, cloud.radius.astype(float)
     x, y = ((place[:, :2] - low) / cell).T  # in cells; their middles lie at k + 1/2
     reach = radius / cell
     first_x, wide = _middles_within(x, reach, columns)
@@ -102,7 +92,7 @@ def make_height_map(
         top = place[sphere[hit], 2] + cell * np.sqrt(cap[hit])
         np.maximum.at(heights, row[hit] * columns + column[hit], top)
         start = stop
-    heights[np.isneginf(heights)] = floor
+    heights[np.isneginf(heights)] = np.nan
     return HeightMap(np.asarray(low, float), float(cell), heights.reshape(shape).astype(np.float32))
 
 
