@@ -135,3 +135,8 @@ def test_laws_have_source_and_test(slot, name):
     assert "``F" in text or "``M" in text
     tests = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "test").rglob("test_*.py"))
     assert name == getattr(ContactModel(), slot) or f'"{slot}": "{name}"' in tests
+
+
+def test_tests_share_by_support_alone():
+    for path in (ROOT / "test").rglob("test_*.py"):
+        assert not [name for name in imports(path) if name.startswith("test_")], path

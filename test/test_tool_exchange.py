@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import trimesh
+from drawn import NO_TURN, drawn, memories, same_state
 from scenes import write_small_scene
-from test_changing import NO_TURN, drawn, memories, same_state
 
 from sand_sim import CommandError, SceneError, ToolPose, World, load_scene
 

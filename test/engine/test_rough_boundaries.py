@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_boundaries import DOMAIN, GRAVITY, LINEAR, POINT, TILTED, across, apart_from_each_other, overlaps, turned, wall
+from walls import DOMAIN, GRAVITY, LINEAR, POINT, TILTED, across, apart_from_each_other, overlaps, turned, wall
 
 from sand_sim import SceneError
 

@@ -4,7 +4,7 @@ from math import inf, pi, tan
 from pathlib import Path
 
 import pytest
-from test_reading import changed
+from good_scene import changed
 
 from sand_sim import SceneError, read_scene
 
