@@ -13,6 +13,10 @@ from sand_sim.scene.types import Scene, Tool
 from sand_sim.track import phases_at, phases_of
 
 _STILL = 1e-4  # [m/s] horizontal speed below which a tool has no draft
+# What each row holds of the world's health, of every tool, by the attribute of its report, and of every plunger.
+_OF_HEALTH = ("contacts", "deepest", "kinetic", "dissipated", "momentum_residual")
+_OF_TOOL = {"position": "position", "velocity": "velocity", "force": "world_force", "torque": "torque", "carried": "carried"}
+_OF_PLUNGER = ("position", "force")
 
 
 @dataclass(frozen=True)
@@ -85,36 +89,19 @@ class RunLog:
         number, self._frames = self._frames, self._frames + 1
         if number % self._every:
             return
-        row = {
-            "time": observation.time,
-            "wall": time.monotonic() - self.started,
-            "steps": observation.steps,
-            "contacts": health.contacts,
-            "deepest": health.deepest,
-            "kinetic": health.kinetic,
-            "dissipated": health.dissipated,
-            "momentum_residual": health.momentum_residual,
-        }
-        for tool in observation.tools:
-            row[f"{tool.name}.position"] = tool.position
-            row[f"{tool.name}.velocity"] = tool.velocity
-            row[f"{tool.name}.force"] = tool.world_force
-            row[f"{tool.name}.torque"] = tool.torque
-            row[f"{tool.name}.carried"] = tool.carried
-        for wall in observation.walls:
-            if wall.name in self._plungers:
-                row[f"wall.{wall.name}.position"], row[f"wall.{wall.name}.force"] = wall.position, wall.force
-        self.rows.append(row)
+        row = {"time": observation.time, "wall": time.monotonic() - self.started, "steps": observation.steps}
+        row |= {name: getattr(health, name) for name in _OF_HEALTH}
+        row |= {f"{tool.name}.{name}": getattr(tool, part) for tool in observation.tools for name, part in _OF_TOOL.items()}
+        plungers = [wall for wall in observation.walls if wall.name in self._plungers]
+        self.rows.append(row | {f"wall.{one.name}.{part}": getattr(one, part) for one in plungers for part in _OF_PLUNGER})
         if len(self.rows) > self.most_rows:
             self.rows, self._every = self.rows[::2], 2 * self._every
 
     @property
     def _names(self) -> set[str]:
         """Of all columns."""
-        names = {"time", "wall", "steps", "contacts", "deepest", "kinetic", "dissipated", "momentum_residual"}
-        parts = ("position", "velocity", "force", "torque", "carried")
-        names |= {f"{tool.name}.{part}" for tool in self.scene.tools for part in parts}
-        return names | {f"wall.{name}.{part}" for name in self._plungers for part in ("position", "force")}
+        names = {"time", "wall", "steps", *_OF_HEALTH} | {f"{tool.name}.{name}" for tool in self.scene.tools for name in _OF_TOOL}
+        return names | {f"wall.{name}.{part}" for name in self._plungers for part in _OF_PLUNGER}
 
     @property
     def _plungers(self) -> set[str]:
