@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sand_sim.showing import shown
+
 _LONGEST_MESSAGE = 400  # letters: whatever a stranger sends ends up in logs and diagnostics
 
 
@@ -19,9 +21,7 @@ class CommandError(ValueError):
     """
 
     def __init__(self, reason: str, message: str):
-        if len(message) > _LONGEST_MESSAGE:
-            message = message[: _LONGEST_MESSAGE // 2] + " ... " + message[-_LONGEST_MESSAGE // 2 :]
-        super().__init__("".join(letter if letter.isprintable() else "?" for letter in message))
+        super().__init__(shown(message, _LONGEST_MESSAGE))
         self.reason = reason
 
 

@@ -8,6 +8,7 @@ from urllib.parse import unquote, urlparse
 from sampler import MeshError, package_prefixes, package_share
 from sand_sim.config_folder import config_folder
 from sand_sim.scene.types import SceneError
+from sand_sim.showing import shown
 
 _LONGEST = 4096  # letters
 _SHOWN = 120  # letters
@@ -47,25 +48,24 @@ def allowed_mesh(uri: str, roots: Sequence[Path], packages: bool) -> Path:
     Raises:
         SceneError: if there is no such file, or it may not be read; that of a forbidden file does not tell whether it exists.
     """
-    shown = uri if len(uri) <= _SHOWN else uri[: _SHOWN // 2] + "..." + uri[-_SHOWN // 2 :]
-    shown = "".join(letter if letter.isprintable() else "?" for letter in shown)
+    name = f"mesh '{shown(uri, _SHOWN)}'"
     try:
         found = list(_found(uri, roots, packages))
         existing = [real for real, allowed in found if allowed and real.is_file()]
     except OSError as error:
-        raise SceneError(f"mesh '{shown}': cannot be read: {error.strerror}") from None
+        raise SceneError(f"{name}: cannot be read: {error.strerror}") from None
     except (MeshError, RuntimeError, ValueError) as error:  # a circle of links is a RuntimeError
-        raise SceneError(f"mesh '{shown}': {error}") from None
+        raise SceneError(f"{name}: {error}") from None
     if existing:
         return existing[0]
     if not (found and all(allowed for _, allowed in found)):
         allowed = ", ".join([*map(str, roots), *(["the share folders of ROS packages"] if packages else [])]) or "none"
         hint = "use package://, or name" if packages else "name"
         raise SceneError(
-            f"mesh '{shown}': lies outside the folders that meshes may come from ({allowed}); {hint} its folder in the parameter "
+            f"{name}: lies outside the folders that meshes may come from ({allowed}); {hint} its folder in the parameter "
             "mesh_roots"
         )
-    raise SceneError(f"mesh '{shown}': there is no file {' or '.join(str(real) for real, _ in found)}")
+    raise SceneError(f"{name}: there is no file {' or '.join(str(real) for real, _ in found)}")
 
 
 def _found(uri: str, roots: Sequence[Path], packages: bool) -> Iterator[tuple[Path, bool]]:

@@ -13,10 +13,10 @@ import numpy as np
 from sand_sim import rotation
 from sand_sim.border import Frame
 from sand_sim.scene.types import SceneError
+from sand_sim.showing import shown
 
 _LARGEST = 10_000_000  # bytes
 _MOST_ELEMENTS, _DEEPEST = 200_000, 100
-_LONGEST_NAME = 60  # letters, as shown
 FIXED = "fixed"
 _JOINTS = (FIXED, "revolute", "continuous", "prismatic", "floating", "planar")
 _XACRO = "is not expanded yet; run: xacro file.xacro > file.urdf"
@@ -151,12 +151,6 @@ def parse_robot(content: str | bytes) -> Robot:
     if loose:
         raise SceneError(f"link '{shown(min(loose))}' hangs on itself")
     return Robot(roots[0], joints, links)
-
-
-def shown(name: str) -> str:
-    """A stranger's name as it may stand in a message."""
-    name = name if len(name) <= _LONGEST_NAME else name[: _LONGEST_NAME - 3] + "..."
-    return "".join(letter if letter.isprintable() else "?" for letter in name)
 
 
 def _parse(content: str | bytes) -> ElementTree.Element:

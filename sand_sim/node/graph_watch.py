@@ -4,7 +4,7 @@ from geometry_msgs.msg import PoseStamped, TwistStamped
 from rclpy.node import Node
 
 from sand_sim.node.parameters import Parameters
-from sand_sim.urdf import shown
+from sand_sim.showing import shown
 
 _TYPES = {"pose": PoseStamped, "twist": TwistStamped}
 _NOT_YET_KNOWN, _NO_NODE = "_NODE_NAME_UNKNOWN_", "_CREATED_BY_BARE_DDS_APP_"
