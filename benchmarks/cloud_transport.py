@@ -16,6 +16,7 @@ import time
 
 import numpy as np
 
+from benchmarks.processes import use_own_domain
 from benchmarks.provenance import provenance
 from sand_sim.border import GrainCloud
 from sand_sim.config_folder import config_folder
@@ -36,7 +37,7 @@ def main() -> None:
     if options.write:
         write(options.points, options.rate, options.seconds, options.write)
         return
-    os.environ |= {"ROS_DOMAIN_ID": str(1 + os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    use_own_domain()
     for profile in (True, False):
         for reliability in ("reliable", "best_effort"):
             row = {"benchmark": "cloud_transport", "points": options.points, "rate": options.rate, "seconds": options.seconds}

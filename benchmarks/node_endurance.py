@@ -8,7 +8,6 @@ there; the node paces itself in real time, so that half a frame and one frame of
 
 import argparse
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -19,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from benchmarks.processes import resident_bytes, use_own_domain
 from benchmarks.provenance import provenance
 from sand_sim import ToolPose
 
@@ -35,7 +35,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--tools", type=int, default=8)
     options = parser.parse_args()
-    os.environ |= {"ROS_DOMAIN_ID": str(1 + os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    use_own_domain()
     with tempfile.TemporaryDirectory() as folder:
         scene = write_scene(Path(folder), options.tools)
         words = ["-p", f"scene:={scene}", "-p", "threads:=1", "-p", "points_rate:=0.0", "--log-level", "warn"]
@@ -113,7 +113,7 @@ def drive(process: subprocess.Popen, tools: int, seconds: float) -> dict:
                 command = ToolPose(f"plate_{k}", np.array([0.03 * k, 0.0, height]), NO_TURN)
                 publisher.publish(command_to_pose(command, "world"))
         if len(memory) <= now:
-            memory.append(resident_memory(process.pid))
+            memory.append(resident_bytes(process.pid))
         executor.spin_once(timeout_sec=0.0005)
     client.destroy_node()
     rclpy.try_shutdown()
@@ -128,11 +128,6 @@ def drive(process: subprocess.Popen, tools: int, seconds: float) -> dict:
         "p99_ms": round(1e3 * float(np.percentile(waits, 99)), 2),
         "memory_mb": [round(memory[k] / 1e6, 1) for k in (half, -1)],
     }
-
-
-def resident_memory(process: int) -> int:
-    """Bytes."""
-    return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 if __name__ == "__main__":

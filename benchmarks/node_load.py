@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.beds import RADIUS, bed_scene, blade_tool
+from benchmarks.processes import use_own_domain
 from benchmarks.provenance import provenance
 from benchmarks.scaling import repeated_scene
 from benchmarks.speed import Setup, spread
@@ -45,8 +46,7 @@ def time_node(setup: Setup, tiles: tuple[int, int] = TILES, pings: int = PINGS) 
         raise SceneError(f"bench: the case 'node' needs ROS 2, and {error.name} cannot be imported") from None
     from rclpy.signals import SignalHandlerOptions
 
-    # A domain of our own, heard on this machine only, whatever else runs on the network.
-    os.environ |= {"ROS_DOMAIN_ID": str(1 + os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    use_own_domain()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         for threads in setup.threads:

@@ -1,14 +1,13 @@
 """Time and memory per grain from 1,000 to 1,000,000 grains: a settled bed and its mirror images side by side."""
 
 import gc
-import os
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from benchmarks.beds import RADIUS, WIDTHS, bed_scene, find_bed, repeat
+from benchmarks.processes import resident_bytes
 from benchmarks.speed import Setup, speed_row, time_in_turn
 from benchmarks.workloads import Workload
 from sand_sim import World, read_scene
@@ -53,8 +52,3 @@ def repeated_scene(bed: str, tiles: tuple[int, int], setup: Setup, **fields) -> 
     path = folder / "repeated.npz"
     np.savez(path, position=position, radius=np.full(len(position), RADIUS))
     return bed_scene((tiles[0] * WIDTHS[bed], tiles[1] * WIDTHS[bed]), path, **fields)
-
-
-def resident_bytes() -> int:
-    """Memory that this process holds now."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
