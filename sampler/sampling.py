@@ -75,14 +75,14 @@ def sample_body(
     closed, owner = closed_triangles(repaired, thickness)
     fine = _spacing(radius, spacing, count, grain, closed)
     around = solid = Surface(closed, device)
-    warnings, plates = list(repaired.report.warnings), np.zeros((0, 3, 3))
+    plates = np.zeros((0, 3, 3))
     # Sheets get one layer of particles where they are thin; the skin of the solids ends only where it is buried in other solids.
     sheet = repaired.faces[repaired.kind == SHEET] if thickness <= 2.0 * radius else np.zeros((0, 3), int)
     if len(sheet) and np.any(owner != SHEET):
         solid = Surface(closed[owner != SHEET], device)
         plates = free_triangles(repaired.vertices[sheet], solid, fine)[0]
     free, parent, layers = free_triangles(solid.triangles, solid, fine)
-    volume, centre, inertia = _mass(solid, free, parent, layers, thick_plates(plates, thickness), warnings)
+    volume, centre, inertia, doubts = _mass(solid, free, parent, layers, thick_plates(plates, thickness))
     if solid is not around:
         free = np.concatenate([free, plates])
     elif len(sheet):
@@ -106,7 +106,7 @@ def sample_body(
 
     area = float(skin.areas.sum())
     points, normals, evenness, wanted = _spread_tight(spread, skin, radius, fine, count, grain)
-    warnings += broken_limits(evenness, len(points), wanted, radius, solid.unit if solid else skin.unit)
+    uneven = broken_limits(evenness, len(points), wanted, radius, solid.unit if solid else skin.unit)
     return ParticleBody(
         points=points,
         normals=normals,
@@ -120,7 +120,7 @@ def sample_body(
         thinnest_wall=thinnest_wall(around),
         evenness=evenness,
         steps=dict(repaired.report.steps),
-        warnings=tuple(warnings),
+        warnings=(*repaired.report.warnings, *doubts, *uneven),
     )
 
 
@@ -225,10 +225,14 @@ def _spacing(radius, spacing, count, grain, triangles) -> float:
     return fine if grain is None else min(fine, _CLOSED * (radius + grain) / _COVERED)
 
 
-def _mass(solid, free, parent, layers, plates, warnings) -> tuple[float, np.ndarray, np.ndarray]:
-    """From all triangles of the solid where none is buried or lies on another, else from its free parts; and from plates."""
+def _mass(solid, free, parent, layers, plates) -> tuple[float, np.ndarray, np.ndarray, list[str]]:
+    """From all triangles of the solid where none is buried or lies on another, else from its free parts; and from plates.
+
+    Returns:
+        Volume [m^3], centre, shape (3,) [m], inertia for a density of one, shape (3, 3) [m^5]; warnings.
+    """
     whole = np.bincount(parent, minlength=len(solid.triangles)) == (solid.areas > 0.0)
-    pieces, share = solid.triangles, np.ones(len(solid.triangles))
+    pieces, share, warnings = solid.triangles, np.ones(len(solid.triangles)), []
     if not np.all(whole) or np.any(layers > 1):
         pieces, share = free, 1.0 / layers
         warnings.append("parts of the surface are buried in others; volume and inertia are those of the union")
@@ -237,6 +241,6 @@ def _mass(solid, free, parent, layers, plates, warnings) -> tuple[float, np.ndar
     corners = np.concatenate([solid.triangles, plates]).reshape(-1, 3)
     low, high = corners.min(axis=0), corners.max(axis=0)
     if is_physical(volume, centre, inertia, low, high):
-        return volume, centre, inertia
+        return volume, centre, inertia, warnings
     warnings.append("the surface encloses no sound volume; mass and inertia must be given by hand")
-    return float("nan"), solid.triangles.mean(axis=(0, 1)), np.full((3, 3), np.nan)
+    return float("nan"), solid.triangles.mean(axis=(0, 1)), np.full((3, 3), np.nan), warnings
