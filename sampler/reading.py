@@ -1,6 +1,7 @@
 """Reading a mesh file and refusing what cannot become a body."""
 
 import io
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,9 @@ from sampler.errors import MeshError
 from sampler.obj import plain_obj
 from sampler.options import is_positive
 from sampler.strips import read_strips
+
+# What trimesh says of damage, with a traceback, of normals that nobody looks at too; what matters is told in one line here.
+logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 _WITH_UNIT = (".dae", ".zae", ".3mf")  # files that state their unit
 

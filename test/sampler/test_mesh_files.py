@@ -124,6 +124,14 @@ def test_text_stl_is_told_however_it_begins(tmp_path, box, write):
         read_mesh(tmp_path / "cut.stl")
 
 
+def test_normals_that_are_no_numbers_are_passed_over_without_words(tmp_path, box):
+    text = re.sub("normal .*", "normal -1.#IND -1.#IND -1.#IND", box.export(file_type="stl_ascii"))
+    (tmp_path / "normals.stl").write_text(text)
+    command = "from sampler import read_mesh; print(len(read_mesh('normals.stl').faces))"
+    run = subprocess.run([sys.executable, "-c", command], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (run.stdout, run.stderr) == ("12\n", "")
+
+
 def test_binary_stl_is_told_though_its_header_says_facet(tmp_path, box):
     (tmp_path / "binary.stl").write_bytes(b"solid of facets".ljust(80) + box.export(file_type="stl")[80:])
     assert read_mesh(tmp_path / "binary.stl").volume == pytest.approx(box.volume, rel=1e-6)
