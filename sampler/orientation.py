@@ -3,7 +3,7 @@
 import numpy as np
 
 from sampler.surface import Surface
-from sampler.topology import Edges, edges_of, link_items
+from sampler.topology import Edges, edges_of, halves_around, link_items
 
 _STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what is there
 _VOTERS = 100  # largest faces of a piece, which tell what side of it is the inside
@@ -43,24 +43,17 @@ def _many_sided(vertices: np.ndarray, faces: np.ndarray, edges: Edges, group: np
     twin = np.zeros(len(faces), bool)
     twin[several] = count[same.ravel()] > 1
     for k in np.flatnonzero(edges.degree > 2):
-        half = np.arange(edges.start[k], edges.start[k + 1])
-        face = edges.face[half]
-        if np.all(group[face] == group[face[0]]):
+        pieces = group[edges.face[edges.start[k] : edges.start[k + 1]]]
+        if np.all(pieces == pieces[0]):
             continue
-        low, high = vertices[edges.ends[k]]
-        axis = (high - low) / (np.linalg.norm(high - low) or 1.0)
-        tip = vertices[faces[face]].sum(axis=1) - low - high  # the corner opposite to the edge
-        away = tip - low - np.outer((tip - low) @ axis, axis)
-        length = np.linalg.norm(away, axis=1)
-        side = away[length.argmax()] / (length.max() or 1.0)
-        order = np.argsort(np.arctan2(away @ np.cross(axis, side), away @ side))
+        half = halves_around(vertices, faces, edges, k)
+        face = edges.face[half]
         runs = edges.forward[half] ^ turned[face]
         agree = twin[face].any() and 2 * runs.sum() == len(runs)
-        for i, j in zip(order, np.roll(order, -1), strict=True):
-            p, q = int(group[face[i]]), int(group[face[j]])
+        for p, q, alike in zip(group[face], np.roll(group[face], -1), runs == np.roll(runs, -1), strict=True):
             if p != q:
-                vote = 1 if runs[i] == runs[j] and not agree else -1
-                votes[min(p, q), max(p, q)] = votes.get((min(p, q), max(p, q)), 0) + vote
+                pair = int(min(p, q)), int(max(p, q))
+                votes[pair] = votes.get(pair, 0) + (1 if alike and not agree else -1)
     ranked = sorted((pair for pair in votes if votes[pair]), key=lambda pair: -abs(votes[pair]))
     a, b = (np.array([pair[k] for pair in ranked], int) for k in (0, 1))
     return a, b, np.array([votes[pair] > 0 for pair in ranked], bool)

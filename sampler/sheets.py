@@ -5,7 +5,7 @@ import numpy as np
 from sampler.caps import close_holes
 from sampler.repair import SHEET, RepairedMesh
 from sampler.surface import Surface
-from sampler.topology import edges_of, link_items
+from sampler.topology import edges_of, halves_around, link_items
 
 _OUT, _PER_SPACING = 0.5, 3.0  # beyond rims, in spacings: over half a lattice row, which covers them; so many per spacing
 
@@ -111,19 +111,11 @@ def _continued_sides(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarra
     a += [p, p + number]
     b += [np.where(same, q + number, q), np.where(same, q, q + number)]
     for k in np.flatnonzero(edges.degree > 2):
-        half = np.arange(edges.start[k], edges.start[k + 1])
+        half = halves_around(vertices, faces, edges, k)
         face, forward = edges.face[half], edges.forward[half]
-        low, high = vertices[edges.ends[k]]
-        axis = (high - low) / np.linalg.norm(high - low)
-        tip = vertices[faces[face]].sum(axis=1) - low - high - low
-        away = tip - np.outer(tip @ axis, axis)
-        side = away[0] / np.linalg.norm(away[0])
-        order = np.argsort(np.arctan2(away @ np.cross(axis, side), away @ side))
         # The front of a face that runs forward looks the way in which the angle grows.
-        onward = np.where(forward, face, face + number)[order]
-        backward = np.where(forward, face + number, face)[order]
-        a.append(onward)
-        b.append(np.roll(backward, -1))
+        a.append(np.where(forward, face, face + number))
+        b.append(np.roll(np.where(forward, face + number, face), -1))
     rim = edges.half[edges.of(1)[:, 0]]
     return np.concatenate(a), np.concatenate(b), rim
 

@@ -93,6 +93,27 @@ def edges_of(faces: np.ndarray) -> Edges:
     return Edges(ends, order, (tail < head)[order], np.append(first, len(order)))
 
 
+def halves_around(vertices: np.ndarray, faces: np.ndarray, edges: Edges, k: int) -> np.ndarray:
+    """Numbers of the half-edges on an edge in the order in which their triangles lie around it.
+
+    Angles grow right-handed about the way from the vertex of the lower number to the other.
+
+    Args:
+        vertices: shape (n, 3) [m].
+        faces: shape (m, 3).
+        edges: of the faces.
+        k: number of the edge.
+    """
+    half = np.arange(edges.start[k], edges.start[k + 1])
+    low, high = vertices[edges.ends[k]]
+    axis = (high - low) / (np.linalg.norm(high - low) or 1.0)
+    tip = vertices[faces[edges.face[half]]].sum(axis=1) - low - high - low  # the corner opposite to the edge, from there
+    away = tip - np.outer(tip @ axis, axis)
+    length = np.linalg.norm(away, axis=1)
+    side = away[length.argmax()] / (length.max() or 1.0)
+    return half[np.argsort(np.arctan2(away @ np.cross(axis, side), away @ side))]
+
+
 def link_items(number: int, a: np.ndarray, b: np.ndarray, turn: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, int]:
     """Join items that are linked.
 
