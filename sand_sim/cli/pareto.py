@@ -146,4 +146,7 @@ def _edit(text: str) -> Edit:
     path, sign, value = text.partition("=")
     if not sign or not path or not value:
         raise argparse.ArgumentTypeError(f"must be PATH=VALUE, got '{text}'")
-    return Edit(path, to(yaml.safe_load(value)))
+    try:
+        return Edit(path, to(yaml.safe_load(value)))
+    except yaml.YAMLError:
+        raise argparse.ArgumentTypeError(f"must be PATH=VALUE with a value as in a scene file, got '{text}'") from None

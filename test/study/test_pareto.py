@@ -156,7 +156,15 @@ def test_refusals_are_one_line(capsys, tmp_path, words, message):
 
 
 @pytest.mark.parametrize(
-    "words", [["--tolerance", "-1"], ["--tolerance", "x"], ["--repeats", "0"], ["--set", "x"], ["--quantity", "beauty"]]
+    "words",
+    [
+        ["--tolerance", "-1"],
+        ["--tolerance", "x"],
+        ["--repeats", "0"],
+        ["--set", "x"],
+        ["--set", "duration=[1, 2"],
+        ["--quantity", "beauty"],
+    ],
 )
 def test_wrong_options_are_refused(capsys, words):
     with pytest.raises(SystemExit):
