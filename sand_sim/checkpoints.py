@@ -22,7 +22,7 @@ from sand_sim.checkpoint import (
 from sand_sim.world import World
 
 PERIOD = 30.0  # [s]
-KEPT = 2
+_KEPT = 2
 
 
 class CheckpointFolder:
@@ -36,16 +36,13 @@ class CheckpointFolder:
         name: of the scene; files are ``NAME.NUMBER.checkpoint``, the newest has the highest number.
         period: wall time between two checkpoints [s]; 0 for one each frame.
         report: called from any thread with a line for the user, once for each trouble and once when it is over.
-        kept: how many are kept.
 
     Raises:
         CheckpointError: if the folder cannot be made or written to, or is in use.
     """
 
-    def __init__(
-        self, folder: Path, name: str, period: float = PERIOD, report: Callable[[str], None] = lambda line: None, kept: int = KEPT
-    ):
-        self.folder, self.period, self._name, self._report, self._kept = Path(folder), period, name, report, kept
+    def __init__(self, folder: Path, name: str, period: float = PERIOD, report: Callable[[str], None] = lambda line: None):
+        self.folder, self.period, self._name, self._report = Path(folder), period, name, report
         if not period >= 0.0:
             raise CheckpointError(f"period of checkpoints: must be 0 s or more, got {period:g}")
         self._pattern = re.compile(re.escape(name) + r"\.(\d+)\.checkpoint")
@@ -125,7 +122,7 @@ class CheckpointFolder:
             files = self.files()
             number = int(self._pattern.fullmatch(files[0].name)[1]) + 1 if files else 1
             write_checkpoint(self.folder / f"{self._name}.{number:08d}.checkpoint", checkpoint)
-            for path in files[self._kept - 1 :]:
+            for path in files[_KEPT - 1 :]:
                 path.unlink(missing_ok=True)
             sync_folder(self.folder)
         except (CheckpointError, OSError) as error:

@@ -236,9 +236,9 @@ class Told(list):
     __call__ = list.append
 
 
-def keep(folder, world, told, times, **further):
+def keep(folder, world, told, times):
     """Run and keep a checkpoint at each time."""
-    checkpoints = CheckpointFolder(folder, "small", 0.0, told, **further)
+    checkpoints = CheckpointFolder(folder, "small", 0.0, told)
     for time in times:
         play(world, time)
         assert checkpoints.due(world.steps)
