@@ -9,10 +9,11 @@ from functools import cache
 
 import numpy as np
 
+_STEPS = 600  # of Runge and Kutta over the longest contact
 _RATIOS = np.concatenate([[0.0], np.geomspace(1e-4, 6.0, 300)])
 
 
-def restitution_of_damping(exponent: float, ratios: np.ndarray, steps: int = 600) -> np.ndarray:
+def restitution_of_damping(exponent: float, ratios: np.ndarray) -> np.ndarray:
     """Restitution of a unit impact ``x'' = -max(0, x^p + 2 z sqrt(p) x^((p-1)/2) x')``.
 
     ``p = 3/2`` is Hertz with damping force ``2 z sqrt(S m) x'`` (S the tangent stiffness), ``p = 1`` the linear
@@ -21,7 +22,6 @@ def restitution_of_damping(exponent: float, ratios: np.ndarray, steps: int = 600
     Args:
         exponent: p [1], power of the overlap in the elastic force.
         ratios: damping ratios z [1], shape (n,).
-        steps: Runge-Kutta steps over the longest contact.
 
     Returns:
         Restitution coefficients [1], shape (n,).
@@ -34,8 +34,8 @@ def restitution_of_damping(exponent: float, ratios: np.ndarray, steps: int = 600
 
     x, u = np.zeros_like(ratios), np.ones_like(ratios)
     # Strong damping prolongs a contact, so each ratio has a step of its own.
-    dt = (3.3 + 6.0 * ratios) / steps
-    for _ in range(steps):
+    dt = (3.3 + 6.0 * ratios) / _STEPS
+    for _ in range(_STEPS):
         x1, u1 = u, -force(x, u)
         x2, u2 = u + 0.5 * dt * u1, -force(x + 0.5 * dt * x1, u + 0.5 * dt * u1)
         x3, u3 = u + 0.5 * dt * u2, -force(x + 0.5 * dt * x2, u + 0.5 * dt * u2)
