@@ -32,10 +32,10 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=100_000)
     parser.add_argument("--rate", type=float, default=30.0, help="clouds per second")
     parser.add_argument("--seconds", type=float, default=10.0)
-    parser.add_argument("--write", choices=("reliable", "best_effort"), help=argparse.SUPPRESS)
+    parser.add_argument("--write", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.write:
-        write(options.points, options.rate, options.seconds, options.write)
+        write(options.points, options.rate, options.seconds)
         return
     use_own_domain()
     for profile in (True, False):
@@ -45,7 +45,7 @@ def main() -> None:
             print(json.dumps(row), flush=True)
 
 
-def write(points: int, rate: float, seconds: float, reliability: str) -> None:
+def write(points: int, rate: float, seconds: float) -> None:
     """Publish, in a process of its own."""
     import rclpy
     from sensor_msgs.msg import PointCloud2
@@ -84,7 +84,7 @@ def read(options: argparse.Namespace, reliability: str, profile: bool) -> dict:
     rclpy.init()
     node = rclpy.create_node("cloud_reader")
     node.create_subscription(PointCloud2, TOPIC, hear, _quality(reliability))
-    words = ["--points", options.points, "--rate", options.rate, "--seconds", options.seconds, "--write", reliability]
+    words = ["--points", options.points, "--rate", options.rate, "--seconds", options.seconds, "--write"]
     environment = os.environ | ({PROFILE: str(config_folder() / "ros" / "fastdds.xml")} if profile else {})
     writer = subprocess.Popen([sys.executable, "-m", "benchmarks.cloud_transport", *map(str, words)], env=environment)
     while writer.poll() is None:
