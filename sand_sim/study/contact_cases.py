@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from sand_sim.study.bench import GRAIN, Bench, plane, run_for
+from sand_sim.study.bench import GRAIN, WALL, Bench, plane, run_for
 from sand_sim.study.closed_forms import impact_overlap, impact_time, plane_modulus, sphere_mass, static_overlap
 from sand_sim.study.verdict import Case, Check
 
@@ -260,7 +260,7 @@ def _second_material(bench, position, radius, velocity, ratio, young, restitutio
         "materials": {
             "grain": GRAIN | {"young": young, "density": ratio * density},
             "light": GRAIN | {"young": young, "density": (own_ratio or 1.0) * density},
-            "wall": {"density": density, "young": 1e25, "poisson": 0.25},
+            "wall": WALL,
         },
         "pairs": [
             {"between": [a, b], "restitution": restitution, "friction": 0.5}
