@@ -49,7 +49,7 @@ def bed_grid(scene, cloud: GrainCloud, cell: float | None = None) -> tuple[np.nd
         reach = cloud.radius[:, None]
         corners += [(cloud.position[:, :2] - reach).min(axis=0), (cloud.position[:, :2] + reach).max(axis=0)]
     if not corners:
-        raise ValueError("there are neither fills with a region nor grains to lay a grid over; give low, cell and shape")
+        raise ValueError("there are neither fills with a region nor grains to lay a grid over")
     if cell is None:
         cell = 2.0 * float(np.median(cloud.radius)) if len(cloud) else 0.02 * float(np.ptp(corners, axis=0).max())
     low, shape = footprint_grid(np.min(corners, axis=0), np.max(corners, axis=0), cell)

@@ -98,7 +98,7 @@ def left_out(assembly: Assembly) -> dict[str, str]:
         "rigid bodies": None if recipe.bodies else "all grains are single spheres",
         "material of each grain": None if recipe.materials else "all grains are of one material",
         "half-step velocities": None if recipe.integrator == VERLET else f"solver.integrator is '{recipe.integrator}'",
-        "digits lost by velocities": None if recipe.carry else "a step of gravity changes them by enough",
+        "digits lost by velocities": None if recipe.carry else "what gravity and friction change in a step is large enough",
         "walls": None if assembly.walls else "the scene has no boundaries",
         "tools": None if scene.tools else "the scene has no tools",
         "true surfaces of tools": None if recipe.smooth_tools else "no tool has contact 'smooth'",
