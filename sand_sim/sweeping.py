@@ -1,5 +1,7 @@
 """Volume of ground that tools sweep: cells below the bed's surface at time zero that a tool's body has passed through."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from sampler import SignedDistance
@@ -149,7 +151,8 @@ def _find_ground(cloud: GrainCloud) -> tuple[float, np.ndarray, np.ndarray]:
     cell, reach = 2.0 * float(np.median(cloud.radius)), cloud.radius[:, None].astype(float)
     bottom, top = (cloud.position - reach).min(axis=0), (cloud.position + reach).max(axis=0)
     corner, shape = footprint_grid(bottom, top, cell)
-    upper, lower = _mean_height(cloud, corner, cell, shape), -_mean_height(_mirrored(cloud), corner, cell, shape)
+    mirrored = replace(cloud, position=cloud.position * [1.0, 1.0, -1.0])
+    upper, lower = _mean_height(cloud, corner, cell, shape), -_mean_height(mirrored, corner, cell, shape)
     layers = int(np.ceil((top[2] - bottom[2]) / cell - 1e-3))
     middles = bottom[2] + (np.arange(layers) + 0.5) * cell
     ground = (middles > lower[:, :, None]) & (middles < upper[:, :, None])  # false where there is no grain
@@ -164,8 +167,3 @@ def _mean_height(cloud: GrainCloud, corner: np.ndarray, cell: float, shape: tupl
     covered = np.isfinite(parts)
     number = covered.sum(axis=2)
     return np.where(number >= 0.5 * _PARTS**2, np.where(covered, parts, 0.0).sum(axis=2) / np.maximum(number, 1), np.nan)
-
-
-def _mirrored(cloud: GrainCloud) -> GrainCloud:
-    parts = {name: getattr(cloud, name) for name in GrainCloud.__dataclass_fields__}
-    return GrainCloud(**parts | {"position": cloud.position * [1.0, 1.0, -1.0]})
