@@ -3,6 +3,7 @@
 import os
 import resource
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -18,7 +19,9 @@ from sand_sim.sinks.run_log import RunLog
 
 pytest.importorskip("rerun")
 
-PORT = 9887
+with socket.socket() as free:  # none that is fixed: another run of the tests may be under way
+    free.bind(("127.0.0.1", 0))
+    PORT = free.getsockname()[1]
 FULL = OSError(28, "No space left on device")
 
 
