@@ -1,13 +1,15 @@
-"""What is doubtful about a world before its first step: overlaps, tools too fine, lengths too small for its numbers."""
+"""What is doubtful about a world before its first step: overlaps, surfaces too fine, lengths too small for its numbers."""
+
+from collections.abc import Iterator
 
 import numpy as np
 
-from sand_sim.assemble import Assembly
+from sand_sim.assemble import Assembly, material_order
 from sand_sim.observing import observe_grains
 from sand_sim.scene.pairing import effective_young, pair_numbers
 from sand_sim.scene.stable_step import DEEP, particles_touched
 
-_CROWD = 2.0  # particles of a tool that a grain may touch at once in an impact
+_CROWD = 2.0  # spheres of a surface that a grain may touch at once in an impact
 _COARSE = 0.1  # resolution over the overlap under a grain's own weight, or of an impact at the expected speed
 
 
@@ -25,19 +27,35 @@ def find_overlap(assembly: Assembly) -> tuple[str, ...]:
     return tuple(doubts)
 
 
-def find_fine_tools(assembly: Assembly) -> tuple[str, ...]:
-    """Doubts that tools have particles so fine that grains touch many at once, each with springs and dashpots of its own."""
-    doubts = []
-    radius, material = max((radius, name) for name, radius in assembly.smallest.items())
-    for model in (tool for tool in assembly.tools if not tool.smooth):
-        overlap = min(_impact_overlap(assembly, material, radius, model.tool.material), DEEP * radius)
-        touched = particles_touched(radius, model.body.radius, model.body.spacing, overlap)
+def find_fine_surfaces(assembly: Assembly) -> tuple[str, ...]:
+    """Doubts that surfaces have spheres so fine that grains touch many at once, each with springs and dashpots of its own.
+
+    The largest grain touches most.
+    """
+    doubts, largest = [], int(np.argmax(assembly.table.radius))
+    radius = float(assembly.table.radius[largest])
+    material = material_order(assembly.scene)[assembly.table.material[largest]]
+    for spheres, other, ball, spacing, field in _layers(assembly):
+        overlap = min(_impact_overlap(assembly, material, radius, other), DEEP * radius)
+        touched = particles_touched(radius, ball, spacing, overlap)
         if touched > _CROWD:
             doubts.append(
-                f"grains touch about {touched:.0f} particles of tool '{model.tool.name}' at once, so contacts are stiffer and "
-                f"restitution lower than asked; take a particle_radius nearer to {0.3 * radius:.2g} m"
+                f"grains touch about {touched:.0f} {spheres} at once, so contacts are stiffer and restitution lower than "
+                f"asked; take a {field} nearer to {0.3 * radius:.2g} m"
             )
     return tuple(doubts)
+
+
+def _layers(assembly: Assembly) -> Iterator[tuple[str, str, float, float, str]]:
+    """Spheres that make up surfaces: what they are called, their material, radius and spacing [m], and the field for it."""
+    bodies = [(f"particles of tool '{one.tool.name}'", one.tool.material, one.body) for one in assembly.tools if not one.smooth]
+    bodies += [(f"particles of terrain '{ground.name}'", ground.material, ground.body) for ground in assembly.grounds]
+    for spheres, material, body in bodies:
+        yield spheres, material, body.radius, body.spacing, "particle_radius"
+    field = "rough.radius, and half the rough.spacing,"
+    for wall in assembly.scene.boundaries:
+        if wall.rough:
+            yield f"virtual spheres of '{wall.name}'", wall.material, wall.rough.radius, wall.rough.spacing, field
 
 
 def find_coarseness(assembly: Assembly) -> tuple[str, ...]:

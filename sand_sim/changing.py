@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from sand_sim.assemble import Assembly
-from sand_sim.beforehand import find_coarseness, find_fine_tools
+from sand_sim.beforehand import find_coarseness, find_fine_surfaces
 from sand_sim.border import Health
 from sand_sim.carrying_over import carry_over, rebuild
 from sand_sim.exchange import check_room, find_grains, read_grains
@@ -106,5 +106,5 @@ class Changeable:
     def _look_anew(self) -> None:
         """Forget what has been found out about other grains or tools."""
         self._swept.set_tools(self.tools)
-        self._beforehand = self._overlap + find_fine_tools(self.assembly) + find_coarseness(self.assembly)
+        self._beforehand = self._overlap + find_fine_surfaces(self.assembly) + find_coarseness(self.assembly)
         self._measured: tuple[int, Health] | None = None

@@ -6,7 +6,7 @@ import numpy as np
 
 from sand_sim import rotation
 from sand_sim.assemble import Assembly, assemble
-from sand_sim.beforehand import find_coarseness, find_fine_tools, find_overlap
+from sand_sim.beforehand import find_coarseness, find_fine_surfaces, find_overlap
 from sand_sim.border import CommandError, Health, Observation, ToolContacts, ToolPose, ToolVelocity
 from sand_sim.carrying_over import describe_changes, expect_layout, fit
 from sand_sim.changing import Changeable
@@ -61,7 +61,7 @@ class World(Changeable):
         self._set_tracks([Track.rest(tool.pose) for tool in scene.tools])
         self._solver.renew_lists()
         self._overlap = find_overlap(self.assembly)
-        self._beforehand = self._overlap + find_fine_tools(self.assembly) + find_coarseness(self.assembly)
+        self._beforehand = self._overlap + find_fine_surfaces(self.assembly) + find_coarseness(self.assembly)
         settle(self.assembly, self._beforehand, progress)
         strike_off(self.assembly)
         self._solver.begin()
