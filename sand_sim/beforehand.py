@@ -10,21 +10,60 @@ from sand_sim.scene.pairing import effective_young, pair_numbers
 from sand_sim.scene.stable_step import DEEP, particles_touched
 
 _CROWD = 2.0  # spheres of a surface that a grain may touch at once in an impact
+_DASHPOTS = 50.0  # times its speed as which the dashpots of a grain in a dense bed may push it
 _COARSE = 0.1  # resolution over the overlap under a grain's own weight, or of an impact at the expected speed
 
 
 def find_overlap(assembly: Assembly) -> tuple[str, ...]:
     """Doubts that grains start inside one another, a wall or a tool; contact lists must be up to date."""
     sums, doubts = assembly.solver.measure(), []
-    if sums.deepest > DEEP:
-        share = f"{100.0 * sums.deepest:.0f} % of a radius"
-        doubts.append(f"grains overlap by {share} at the start; the {sums.elastic:.3g} J stored there drive them apart")
+    driven = _driven(assembly)
+    if sums.deepest > DEEP or driven > _harmless(assembly):
+        share = f"{100.0 * sums.deepest:.2g} % of a radius"
+        stored = f"the {sums.elastic:.3g} J stored there drive them apart"
+        doubts.append(f"grains overlap by {share} at the start; {stored}, at some {driven:.2g} m/s")
     position = observe_grains(assembly).position
     for tool in assembly.tools:
         inside = int((tool.distance(position) < -tool.margin).sum())
         if inside:
             doubts.append(f"grains start inside tool '{tool.tool.name}' ({inside} of them), where nothing touches them")
     return tuple(doubts)
+
+
+def _harmless(assembly: Assembly) -> float:
+    """A speed [m/s] that grains would have anyway: as expected, from dashpots, or by a fall of their radius."""
+    table, gravity = assembly.table, float(np.linalg.norm(assembly.scene.gravity))
+    given, fall = np.linalg.norm(table.velocity, axis=1).max(), np.sqrt(2.0 * gravity * table.radius.min())
+    return float(assembly.time_step.speed + _DASHPOTS * given + fall)
+
+
+def _driven(assembly: Assembly) -> float:
+    """How fast what is stored in contacts makes a grain at most, ``F/sum(f) sqrt(2 E/m)``; nothing where forces balance [m/s].
+
+    F is the sum of contact forces f and weight, E the energy of the contacts, half of it where both sides are grains.
+
+    Args:
+        assembly: whose solver has just measured.
+    """
+    table, arrays = assembly.table, assembly.solver.arrays
+    mass = np.zeros(table.grains)
+    mass[assembly.lone_grain], mass[assembly.grain_of_body] = table.mass[table.lone], table.bodies.mass
+    grain = assembly.grain_of_sphere[arrays.grains.identity.numpy()]
+    force = mass[:, None] * np.asarray(assembly.scene.gravity)
+    size, stored = np.linalg.norm(force, axis=1), np.zeros(table.grains)
+    for name, contacts in arrays.lists.items():
+        number = contacts.pairs.get()
+        acting = np.flatnonzero(contacts.force.numpy()[:number].any(axis=1))
+        push = contacts.force.numpy()[acting, :3].astype(float)
+        energy = np.maximum(arrays.energy[name].numpy()[acting].astype(float), 0.0)
+        sides = [(contacts.owner, 1.0), (contacts.partner, -1.0)] if name == "pair" else [(contacts.owner, 1.0)]
+        for spheres, sign in sides:
+            met = grain[spheres.numpy()[acting]]
+            np.add.at(force, met, sign * push)
+            np.add.at(size, met, np.linalg.norm(push, axis=1))
+            np.add.at(stored, met, energy / len(sides))
+    share = np.linalg.norm(force, axis=1) / np.where(size > 0.0, size, 1.0)
+    return float((share * np.sqrt(2.0 * stored / mass)).max())
 
 
 def find_fine_surfaces(assembly: Assembly) -> tuple[str, ...]:

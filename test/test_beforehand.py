@@ -61,3 +61,40 @@ def test_the_largest_grain_decides_whether_a_surface_is_too_fine(make_world):
         domain={"low": [-0.1, -0.1, -0.05], "high": [0.1, 0.1, 0.15]},
     )
     assert any("virtual spheres of 'floor' at once" in doubt for doubt in world.observe().health.doubts)
+
+
+def stack(layers, overlap):
+    """Places of a column of grains on the floor that overlap by a share of the radius, and the floor by half of it: as hard."""
+    heights = RADIUS * (1.0 - 0.5 * overlap + (2.0 - overlap) * np.arange(layers))
+    return np.column_stack([np.zeros((layers, 2)), heights])
+
+
+@pytest.mark.parametrize("young", [1e7, 7e10])
+def test_slight_overlap_of_stiff_grains_is_doubted(make_world, young):
+    """The same overlap is next to nothing among soft grains, but shoots stiff ones away."""
+    grain = {"density": 2500.0, "young": young, "poisson": 0.25}
+    further = {"gravity": [0.0, 0.0, -9.81], "restitution": 0.9, "friction": 0.0}
+    world = make_world(stack(3, 0.01), RADIUS, boundaries=floor(), material=grain, **further)
+    expected = np.sqrt(2.0 * 9.81 * np.ptp(stack(3, 0.01)[:, 2]))
+    doubted = any("grains overlap by 1 % of a radius at the start" in doubt for doubt in world.observe().health.doubts)
+    fastest = 0.0
+    for _ in range(60):
+        world.step(20)
+        fastest = max(fastest, world.observe().health.fastest)
+    assert doubted == (young > 1e9) == (fastest > expected)
+
+
+def test_grains_that_are_held_together_are_not_doubted(make_world):
+    """Between two walls, without gravity: much is stored and nothing moves."""
+    places = stack(4, 0.05)
+    lid = {
+        "type": "plane",
+        "name": "lid",
+        "material": "wall",
+        "point": [0, 0, places[-1, 2] + places[0, 2]],
+        "normal": [0, 0, -1],
+    }
+    grain = {"density": 2500.0, "young": 7e10, "poisson": 0.25}
+    world = make_world(places, RADIUS, boundaries=[*floor(), lid], material=grain)
+    assert world.observe().health.elastic > 0.0
+    assert world.observe().health.doubts == ()

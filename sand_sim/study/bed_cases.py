@@ -96,7 +96,7 @@ def confined(
 def bed(bench: Bench, young: float = 1e7, friction: float = 0.5, gravity: float = 9.81, layers: int = 6) -> Iterator[Check]:
     """Grains fall a little and come to rest in a box: the floor carries their weight."""
     points = lattice((5, 5, layers), 2.02 * _RADIUS, (1.05 * _RADIUS,) * 3)
-    points[:, :2] += np.random.default_rng(2).uniform(-0.02, 0.02, (len(points), 2)) * _RADIUS
+    points[:, :2] += np.random.default_rng(2).uniform(-0.01, 0.01, (len(points), 2)) * _RADIUS  # they do not overlap
     side = 5 * 2.02 * _RADIUS + 0.1 * _RADIUS
     world = bench.make(
         points,
