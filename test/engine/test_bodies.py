@@ -6,6 +6,7 @@ import trimesh
 from scenes import RIGID, floor
 
 from sand_sim import SceneError, World, read_scene, rotation
+from sand_sim.contact.damping import damping_ratio, restitution_of_damping
 
 MATERIALS = {
     "stone": {"density": 2500.0, "young": 1e7, "poisson": 0.25},
@@ -83,6 +84,21 @@ def test_off_centre_impact_follows_rigid_body_theory(make_bodies):
     assert body.velocity[2] == pytest.approx(-0.5 + impulse / mass, abs=2e-3)
     assert abs(body.spin[1]) == pytest.approx(impulse * arm / inertia, rel=5e-3)
     assert body.velocity[0] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("columns", "rows", "expected"), [(1, 1, 0.5), (2, 1, 0.39), (3, 1, 0.33), (3, 3, 0.19)])
+def test_spheres_that_hit_at_once_bounce_less_as_documented(make_bodies, columns, rows, expected):
+    """Each has a dashpot for the whole mass, so that n of them damp as one contact ``sqrt(n)`` times as strongly damped."""
+    spheres = [[0.012 * column, 0.012 * row, 0.0, 0.006] for column in range(columns) for row in range(rows)]
+    world = make_bodies(
+        {"plate": {"spheres": spheres, "pose": {"position": [0.0, 0.0, 0.007]}, "velocity": [0.0, 0.0, -0.5]}},
+        boundaries=floor(),
+    )
+    world.step(round(0.02 / world.time_step))
+    plate = world.observe().body("plate")
+    assert plate.velocity[2] / 0.5 == pytest.approx(expected, abs=0.01)
+    ratio = np.sqrt(columns * rows) * damping_ratio(0.5, exponent=1.5)
+    assert restitution_of_damping(1.5, np.array([ratio]))[0] == pytest.approx(expected, abs=0.01)
 
 
 @pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-12), ("single", 2e-6)])
