@@ -8,7 +8,8 @@ import threading
 
 import numpy as np
 import pytest
-from scenes import write_small_scene
+import trimesh
+from scenes import floor, write_small_scene
 
 from sand_sim import SceneError, UnstableError, World, load_scene
 from sand_sim.playing import commands_at, frame_times
@@ -114,6 +115,28 @@ def test_energy_from_nowhere_stops_a_run(tmp_path):
     with pytest.raises(UnstableError, match=r"J, most of the energy there is, appeared from nowhere"):
         list(play(world))
     assert world.observe().health.gained < 1e-3 * world.observe().health.dissipated
+
+
+@pytest.mark.parametrize("max_speed", [0.1, 50.0])
+def test_energy_from_nowhere_is_told_however_fast_a_tool_may_be(make_world, tmp_path, max_speed):
+    """A tool that does nothing must not widen what the balance puts up with."""
+    trimesh.creation.box((0.01, 0.01, 0.01)).export(tmp_path / "idle.stl")
+    tool = {"mesh": "idle.stl", "material": "wall", "particle_radius": 0.004, "max_speed": max_speed}
+    places = np.stack(np.meshgrid(*3 * [0.0101 * np.arange(4.0)], indexing="ij"), -1).reshape(-1, 3) + [0.0, 0.0, 0.005]
+    world = make_world(
+        places,
+        0.005,
+        gravity=[0.0, 0.0, -9.81],
+        boundaries=floor(),
+        tools={"idle": tool | {"pose": {"position": [0.0, 0.0, 0.2]}}},
+    )
+    world.step(round(0.05 / world.time_step))
+    assert not any("nowhere" in doubt for doubt in world.observe().health.doubts)
+    state = world.save()
+    for name in ("grains.motion", "grains.half_motion"):
+        state[name][:, 2] += 0.05
+    world.restore(state)
+    assert any("appeared from nowhere" in doubt for doubt in world.observe().health.doubts)
 
 
 def test_a_bed_that_blows_up_while_settling_is_refused(tmp_path):
