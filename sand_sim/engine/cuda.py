@@ -118,6 +118,3 @@ class CudaDevice:
     def synchronize(self) -> None:
         """Wait until all that was set going is done."""
         wp.synchronize_device(self.name)
-
-    def close(self) -> None:
-        """There is nothing to end."""

@@ -175,7 +175,3 @@ class CpuDevice:
             wait(running)
             self._meeting.zero_()
             raise
-
-    def close(self) -> None:
-        """End the threads."""
-        self._threads.shutdown()

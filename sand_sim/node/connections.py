@@ -53,8 +53,8 @@ class Connections:
             # What else has come in is taken at once: the executor needs ten times as long to bring one message.
             heard = 1
             while heard <= _MOST_IN_TURN:
-                with made.handle:
-                    taken = made.handle.take_message(kind, False)
+                with handle:
+                    taken = handle.take_message(kind, False)
                 if taken is None:
                     break
                 hear(taken[0])
@@ -70,6 +70,7 @@ class Connections:
             qos_profile=usual_quality(COMMANDS_DEPTH, latched),
             event_callbacks=SubscriptionEventCallbacks(incompatible_qos=warn_of_publisher(self._node, topic)),
         )
+        handle = made.handle  # with the subscription itself its callback would be a cycle, which keeps all that it tells
         self._undo.append(lambda: self._node.destroy_subscription(made))
 
     def service(self, kind: type, name: str, answer: Callable) -> None:

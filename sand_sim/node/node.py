@@ -238,6 +238,9 @@ class SandSimNode(LifecycleNode):
         """Stop stepping, finish all files, and let go of everything that belongs to a world."""
         self._active = self.configured = False
         self._endings.close()
+        # The node may go on for long: what it still held would keep the world's memory and its threads.
+        self.simulation = self.recorder = self._last = self._diagnosed = None
+        self._tools, self._bed, self._diagnosis, self._watch = [], None, None, None
 
     def _finish_files(self) -> None:
         for path in self.recorder.close():

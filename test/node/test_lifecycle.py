@@ -1,6 +1,7 @@
 """Lifecycle: configure, activate, deactivate, clean up, and whatever a client asks in the wrong moment."""
 
 import gc
+import weakref
 
 import pytest
 
@@ -130,3 +131,22 @@ def test_a_destroyed_node_leaves_the_graph(client, tmp_path):
         client.wait_for(lambda: "sand_sim" not in client.node.get_node_names(), patience=5.0)
     finally:
         gc.enable()
+
+
+def test_a_world_that_is_cleaned_up_goes_with_its_threads(ros, tmp_path):
+    """At once, not when garbage is collected: the next one is made beside it, and a test beside nodes that have ended."""
+    node = SandSimNode(parameter_overrides=[Parameter("scene", value=str(write_small_scene(tmp_path)))])
+    gc.collect()
+    gc.disable()
+    try:
+        node.start()
+        assert node.simulation.step().result(30.0) is None
+        world = node.simulation.world
+        left = [weakref.ref(one) for one in (node.simulation, world, world.assembly.solver.device)]
+        del world
+        node.trigger_deactivate()
+        node.trigger_cleanup()
+        assert [one() for one in left] == [None, None, None]
+    finally:
+        gc.enable()
+        node.destroy_node()
