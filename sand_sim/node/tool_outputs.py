@@ -41,7 +41,7 @@ class ToolOutputs:
         self._contacts = connections.publisher(PointCloud2, f"{topic}/contacts")
         self._markers = connections.publisher(MarkerArray, f"{topic}/contact_markers")
         self._contacts_rate = Rate()
-        self._filter, self._filtered_at = LowPass(parameters["wrench_cutoff"]), 0.0
+        self._filter, self._filtered_at = LowPass(parameters["wrench_cutoff"]), -np.inf
         cloud = world.observe().grains
         self._diameter = 2.0 * float(np.median(cloud.radius)) if len(cloud) else 0.01
         weight = float(np.median(cloud.mass)) * max(float(np.linalg.norm(world.scene.gravity)), 1.0) if len(cloud) else 1.0
@@ -79,7 +79,12 @@ class ToolOutputs:
         return self._parameters[f"tools.{self._tool}.frame"]
 
     def _publish_wrenches(self, report: ToolReport, time: float) -> None:
-        """Mean over the frame, and filtered: in the axes of the world, which do not turn, before it is turned into the tool's."""
+        """Mean over the frame, and filtered: in the axes of the world, which do not turn, before it is turned into the tool's.
+
+        Each stamp is told once, or whoever sums up impulses would count the frame again when grains are added at its end.
+        """
+        if time == self._filtered_at:
+            return
         wrench = np.array([report.world_force, rotation.rotate(report.orientation, report.torque)])
         filtered = self._filter_at(time, wrench)
         frame_id = self._parameters["frame_id"]

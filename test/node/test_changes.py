@@ -72,6 +72,20 @@ def test_a_state_is_named_after_its_scene(client, start_node, tmp_path):
     assert ask(client, "load_state")[0]
 
 
+def test_a_change_between_frames_adds_no_wrench(client, start_node):
+    """The mean over a frame is told once; what grains come to at the same stamp is seen in the cloud."""
+    start_node(pacing="lockstep")
+    client.connect()
+    client.send(START - [0.0, 0.0, 0.0362], at=0.2)
+    client.wait_for(lambda: client.time > 0.1999)
+    assert ask(client, "spawn_grains", position=[0.1, 0.1, 0.1], radius=0.005)[0]
+    client.wait_for(lambda: len(cloud_to_points(client.clouds[-1])) == 33)
+    client.send(START - [0.0, 0.0, 0.0362], at=0.22)
+    client.wait_for(lambda: client.time > 0.2199 and stamp_to_time(client.wrenches[-1].header.stamp) > 0.2199)
+    stamps = [stamp_to_time(message.header.stamp) for message in client.wrenches]
+    assert len(set(stamps)) == len(stamps)
+
+
 def test_grains_come_and_go(client, start_node):
     node = start_node(pacing="lockstep")
     client.connect()
