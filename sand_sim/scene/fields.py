@@ -57,7 +57,7 @@ class Field:
             if isinstance(self.value, bool):
                 raise TypeError
             number = float(self.value)  # also turns '1e7', which YAML reads as text, into a number
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):  # of whole numbers with hundreds of digits
             raise self.refuse(f"must be a number{_in(unit)}, got {_shown(self.value)}") from None
         if not math.isfinite(number):
             raise self.refuse(f"must be finite, got {number}")

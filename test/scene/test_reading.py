@@ -26,6 +26,7 @@ def test_good_scene_is_read():
         (("materials", "sand", "density"), -1.0, "materials.sand.density: must be greater than 0 [kg/m^3], got -1"),
         (("materials", "sand", "poisson"), 0.7, "materials.sand.poisson: must be at least"),
         (("materials", "sand", "young"), "stiff", "materials.sand.young: must be a number [Pa], got 'stiff'"),
+        (("materials", "sand", "young"), 10**400, "materials.sand.young: must be a number [Pa], got 1000"),
         (("materials", "sand", "yuong"), 1.0, "materials.sand: unknown field 'yuong'; did you mean 'young'?"),
         (("materials", "sand", "density"), None, "materials.sand: the field 'density' is missing"),
         (("pairs", 0, "friction"), -0.1, "pairs[0].friction: must be at least 0, got -0.1"),
