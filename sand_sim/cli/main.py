@@ -29,7 +29,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         interruption.check()
         return options.execute(options, interruption)
-    except (CheckpointError, SceneError) as error:
+    except (CheckpointError, SceneError, OSError) as error:  # the last, of files that cannot be written
         print(f"sand_sim: {error}", file=sys.stderr)
         return 1
     except InterruptedByUserError:

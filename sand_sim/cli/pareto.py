@@ -52,6 +52,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb."""
     console, path = Console(), find_scene(options.scene)
     scene = load_scene(path)
+    options.out.mkdir(parents=True, exist_ok=True)  # now, not when all has been done
     whole = yaml.safe_load(path.read_text(encoding="utf-8"))
     facts = Facts.of(scene)
     preparation = prepare(path, scene, facts.grains, options.quantity)
@@ -110,7 +111,6 @@ def _write(study: Study, name: str, chosen: tuple | None, notes: list[str], fold
     """Write JSON and, where matplotlib is installed, the figure; return their paths."""
     rows, plan, scatter = study.rows(), study.plan, study.scatter()
     recommended = chosen[1].title if chosen else ""
-    folder.mkdir(parents=True, exist_ok=True)
     files = [folder / f"{name}_pareto.json"]
     plain = {
         "scene": name,

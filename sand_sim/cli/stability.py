@@ -18,6 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb; the exit code is 1 if anything is silently wrong, or an automatic time step not stable."""
+    options.out.mkdir(parents=True, exist_ok=True)  # now, not when all has been done
     console = Console()
     result = sweep(options.quick, lambda what, share: console.line(f"{100.0 * share:3.0f} %  {what}"), interruption.check)
     console.end()

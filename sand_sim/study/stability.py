@@ -48,7 +48,6 @@ class Sweep:
 
     def save(self, path: Path) -> None:
         """Write a JSON file."""
-        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(self.as_dict(), indent=1, default=float) + "\n")
 
 

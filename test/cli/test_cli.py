@@ -58,6 +58,16 @@ def test_refusals_are_one_line(tmp_path):
     assert len(errors.strip().splitlines()) == 1
 
 
+@pytest.mark.parametrize("words", [["pareto", "impact"], ["stability"], ["demo"]])
+def test_a_folder_that_cannot_be_made_is_refused_at_once(tmp_path, words):
+    (tmp_path / "file").touch()
+    code, output, errors = finish(sand_sim(tmp_path, *words, "--out", "file/out"))
+    assert code == 1
+    assert errors.startswith("sand_sim: [Errno 20] Not a directory: 'file/out")
+    assert len(errors.strip().splitlines()) == 1
+    assert not output
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
