@@ -5,8 +5,10 @@ import time
 
 import rclpy
 from geometry_msgs.msg import PoseStamped
+from rclpy.exceptions import NameValidationException
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from rclpy.validate_full_topic_name import validate_full_topic_name
 from rosgraph_msgs.msg import Clock
 
 from msg_adapters.builtin_interfaces import stamp_to_time
@@ -32,11 +34,16 @@ def play(scene: Scene, target: str, frame_id: str, interruption: Interruption) -
         Exit code: 0 when all has been played, 130 when interrupted.
 
     Raises:
-        SceneError: if there is nothing to play, simulated time is past all of it, or the node has gone before the end.
+        SceneError: if there is nothing to play, no node can have that name, simulated time is past all of it, or the node has
+            gone before the end.
     """
     driven = [tool.name for tool in scene.tools if tool.trajectory]
     if not driven:
         raise SceneError(f"scene '{scene.name}' has no tool with a trajectory, so there is nothing to play")
+    try:
+        validate_full_topic_name(f"/{target}")
+    except NameValidationException as error:
+        raise SceneError(f"--node '{target}': {' '.join(str(error).split())}") from None
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("sand_sim_player")
     try:

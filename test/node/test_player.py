@@ -98,3 +98,12 @@ def test_a_scene_without_a_path(tmp_path, play):
     code, errors = finish(play())
     assert code == 1
     assert "has no tool with a trajectory" in errors
+
+
+@pytest.mark.parametrize("name", ["my arm", "", "1st"])
+def test_a_name_that_no_node_can_have(tmp_path, play, name):
+    write_small_scene(tmp_path)
+    code, errors = finish(play("--node", name))
+    assert code == 1
+    assert errors.startswith(f"sand_sim: --node '{name}': ")
+    assert len(errors.splitlines()) == 1
