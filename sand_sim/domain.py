@@ -11,6 +11,7 @@ from sand_sim.terrain import Ground
 from sand_sim.tool_model import ToolModel
 
 _MARGIN = 0.25  # of the scene's largest edge, free around everything in it
+_COARSEST = 0.1  # resolution over the smallest radius; beyond, kernels lose count of cells
 
 
 def make_lattice(
@@ -19,8 +20,21 @@ def make_lattice(
     """The lattice over the domain that a scene gives, or over all that is in it and a margin.
 
     Raises:
-        SceneError: if a grain starts outside of it, or a terrain has its middle there.
+        SceneError: if a grain starts outside of it, a terrain has its middle there, or it is so large that grains get lost in it.
     """
+    lattice = _lattice(scene, table, walls, tools, grounds, precision)
+    smallest = float(table.radius.min(initial=np.inf))
+    if not lattice.quantum < _COARSEST * smallest:  # nor if it is not a number
+        remedy = "make it smaller" if scene.domain is not None else "give one: it reaches as far as all that is in it"
+        raise SceneError(
+            f"domain: positions are resolved to {lattice.quantum:.2g} m, but the smallest radius is {smallest:.2g} m; {remedy}"
+        )
+    return lattice
+
+
+def _lattice(
+    scene: Scene, table: GrainTable, walls: list[Wall], tools: list[ToolModel], grounds: list[Ground], precision: Precision
+) -> Lattice:
     reserve = 1.05 * max([tool.extent for tool in tools] + [float(np.linalg.norm(table.offset, axis=1).max(initial=0.0))])
     if scene.domain is not None:
         low, high = (np.asarray(corner, float) for corner in scene.domain)

@@ -79,6 +79,16 @@ def test_grains_that_start_outside_of_the_domain_are_refused(make_world, x):
         make_world([[0.0, 0.0, 0.1], [x, 0.0, 0.1], [0.0, 0.0, 0.2]], 0.005, domain=HIGH, precision="single")
 
 
+@pytest.mark.parametrize("far", [1e7, 1e40, 1e300])
+def test_a_domain_in_which_grains_get_lost_is_refused(make_world, far):
+    """Such as somebody gives who means an endless one; kernels crashed in it."""
+    with pytest.raises(
+        SceneError, match=r"domain: positions are resolved to .* the smallest radius is 0\.005 m; make it smaller"
+    ):
+        domain = {"low": [-far] * 3, "high": [far] * 3}
+        make_world([[0.0, 0.0, 0.1], [0.0, 0.0, 0.2]], 0.005, domain=domain, precision="single")
+
+
 @pytest.mark.parametrize("integrator", ["velocity_verlet", "symplectic_euler"])
 @pytest.mark.parametrize(("young", "speed"), [(1e9, 3.0), (7e10, 1.2)])
 def test_short_steps_fall_as_fast_as_long_ones(make_world, young, speed, integrator):
