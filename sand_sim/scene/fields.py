@@ -7,6 +7,8 @@ from typing import Any
 
 from sand_sim.scene.types import SceneError
 
+_LARGEST = 1e30  # nobody means more, or less than its inverse, and powers of it are still numbers
+
 
 class Field:
     """A value in the file and the path that leads to it."""
@@ -61,6 +63,8 @@ class Field:
             raise self.refuse(f"must be a number{_in(unit)}, got {_shown(self.value)}") from None
         if not math.isfinite(number):
             raise self.refuse(f"must be finite, got {number}")
+        if number and not 1.0 / _LARGEST <= abs(number) <= _LARGEST:
+            raise self.refuse(f"must be between {1.0 / _LARGEST:g} and {_LARGEST:g} in size, or 0, got {number:g}")
         if not (number > above and least <= number <= most):
             bounds = [f"greater than {above:g}"] if above > -math.inf else []
             bounds += [f"at least {least:g}"] if least > -math.inf else []

@@ -79,7 +79,7 @@ def test_grains_that_start_outside_of_the_domain_are_refused(make_world, x):
         make_world([[0.0, 0.0, 0.1], [x, 0.0, 0.1], [0.0, 0.0, 0.2]], 0.005, domain=HIGH, precision="single")
 
 
-@pytest.mark.parametrize("far", [1e7, 1e40, 1e300])
+@pytest.mark.parametrize("far", [1e7, 1e30])
 def test_a_domain_in_which_grains_get_lost_is_refused(make_world, far):
     """Such as somebody gives who means an endless one; kernels crashed in it."""
     with pytest.raises(

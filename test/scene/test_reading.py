@@ -27,6 +27,12 @@ def test_good_scene_is_read():
         (("materials", "sand", "poisson"), 0.7, "materials.sand.poisson: must be at least"),
         (("materials", "sand", "young"), "stiff", "materials.sand.young: must be a number [Pa], got 'stiff'"),
         (("materials", "sand", "young"), 10**400, "materials.sand.young: must be a number [Pa], got 1000"),
+        (
+            ("materials", "sand", "young"),
+            1e300,
+            "materials.sand.young: must be between 1e-30 and 1e+30 in size, or 0, got 1e+300",
+        ),
+        (("materials", "sand", "density"), 1e-300, "materials.sand.density: must be between 1e-30 and 1e+30 in size, or 0"),
         (("materials", "sand", "yuong"), 1.0, "materials.sand: unknown field 'yuong'; did you mean 'young'?"),
         (("materials", "sand", "density"), None, "materials.sand: the field 'density' is missing"),
         (("pairs", 0, "friction"), -0.1, "pairs[0].friction: must be at least 0, got -0.1"),
