@@ -1,18 +1,24 @@
-"""What ``docs/node.md`` shows to those who write tests of their own is run as it stands there."""
+"""What ``docs/node.md`` shows is run as it stands there."""
 
 import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 pytestmark = pytest.mark.xdist_group("processes")
 
+import yaml
 from scenes import write_small_scene
+
+from sand_sim import World, load_scene
+from sand_sim.config_folder import find_scene
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "node.md"
 
@@ -45,3 +51,12 @@ def test_documented_second_node_has_a_clock_of_its_own(client, tmp_path, name):
         assert client.node.count_publishers(f"/{name}/sand_sim/tools/plate/wrench")
     finally:
         node.destroy_node()
+
+
+def test_documented_grains_are_added_to_the_usual_scene():
+    words = re.search(r'SetParametersAtomically "(.*?)"\n', DOCUMENT.read_text(), re.DOTALL).group(1)
+    value = {one["name"]: one["value"] for one in yaml.safe_load(words)["parameters"]}
+    scene = load_scene(find_scene("dig"))
+    world = World(replace(scene, fills=(replace(scene.fills[0], height=None, count=100),)))  # settles sooner than the whole bed
+    position = np.reshape(value["position"]["double_array_value"], (-1, 3))
+    assert len(world.add_grains(position, value["radius"]["double_value"], None, 0.0)) == 2
