@@ -222,7 +222,7 @@ class SandSimNode(LifecycleNode):
         self._tools = [ToolOutputs(connections, parameters, world, tool.name) for tool in world.scene.tools]
         self._bed = BedOutputs(connections, parameters, world, self._complain)
         self._endings.callback(self._bed.close)
-        inputs = ToolInputs(connections, parameters, self.simulation, lambda: self._active, frames)
+        inputs = ToolInputs(connections, parameters, self.simulation, lambda: self._active, frames, lambda: self._last)
         services = Services(self, connections, self.simulation, self.hold)
         ChangeServices(connections, services, self.simulation, Path(parameters["states"]).expanduser())
         if simulation_interfaces.srv is None:

@@ -9,7 +9,7 @@ from geometry_msgs.msg import PoseStamped, TwistStamped
 from msg_adapters import tf2_msgs
 from msg_adapters.geometry_msgs import pose_to_command, twist_to_command
 from sand_sim import rotation
-from sand_sim.border import CommandError, Frame, ToolPose
+from sand_sim.border import CommandError, Frame, Observation, ToolPose
 from sand_sim.frames import FrameTree
 from sand_sim.node.connections import Connections
 from sand_sim.node.parameters import Parameters, frame_declarations
@@ -27,6 +27,7 @@ class ToolInputs:
         simulation: that gets the commands.
         active: tells whether commands are taken now.
         frames: fixed ones of the robot, parents first; those that parameters fix, too, are as the parameters say.
+        last: tells what was shown last, None if nothing was.
 
     Raises:
         ValueError: if a tool is to follow TF and its messages are not installed, or a fixed frame cannot be.
@@ -42,8 +43,9 @@ class ToolInputs:
         simulation: Simulation,
         active: Callable[[], bool],
         frames: Sequence[Frame] = (),
+        last: Callable[[], Observation | None] = lambda: None,
     ):
-        self._parameters, self._simulation, self._active = parameters, simulation, active
+        self._parameters, self._simulation, self._active, self._last = parameters, simulation, active, last
         self.frames = _fixed_frames(parameters, frames)
         self._fixed = {*parameters["frame_names"], *(frame.name for frame in frames)}
         self._followers: dict[str, str] = {}
@@ -117,15 +119,26 @@ class ToolInputs:
             self._follow(tool, name, told)
 
     def _follow(self, tool: str, name: str, told: set[str]) -> None:
-        """Command the pose of a frame if news concern it, at the time of the newest frame that it hangs on."""
+        """Command the pose of a frame if news concern it, at the time that they are of."""
         try:
             chain = list(self.frames.chain(name))
         except CommandError:
             return  # not told yet
-        latest = max(frame.time or 0.0 for frame in chain) if chain else 0.0
+        latest = self._newest([frame.time or 0.0 for frame in chain] or [0.0])
         if told & {frame.name for frame in chain} and not (latest and latest == self._followed.get(tool)):
             self._followed[tool] = latest
             self._submit(lambda: ToolPose(tool, *self.frames.in_root(name, _NO_MOVE, _NO_TURN), time=latest or None), tool)
+
+    def _newest(self, times: list[float]) -> float:
+        """The newest of the times of frames that hang on each other [s].
+
+        Frames that hold for a while are stamped ahead, as localisation does with that of the odometry, by a second and at 2 Hz;
+        they would stand for all that the arm tells meanwhile. In lockstep, and by another clock, nobody knows what is ahead.
+        """
+        last = self._last()
+        if last is None or self._simulation.pacing == "lockstep" or self._parameters["stamps"] != "simulated":
+            return max(times)
+        return max([time for time in times if time <= last.time + self._simulation.frame] or times)
 
 
 def _fixed_frames(parameters: Parameters, of_robot: Sequence[Frame]) -> FrameTree:

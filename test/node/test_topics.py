@@ -184,8 +184,9 @@ def test_velocities_drive_a_tool(client, start_node):
     client.wait_for(lambda: node.simulation.rejected == {"unknown_frame": 1})
 
 
-def test_a_tool_follows_its_frame_in_tf(monkeypatch):
-    """The messages of TF are not among the wheels, so they come without the middleware."""
+@pytest.fixture
+def follow(monkeypatch):
+    """``follow(last)`` lets the plate follow ``tcp``; the messages of TF are not among the wheels: without the middleware."""
     monkeypatch.setattr(tf2_msgs, "TFMessage", SimpleNamespace)
     heard, submitted, rejected = {}, [], []
 
@@ -200,12 +201,21 @@ def test_a_tool_follows_its_frame_in_tf(monkeypatch):
         "tools.plate.frame": "tcp",
     }
     scene = SimpleNamespace(tools=[SimpleNamespace(name="plate")])
-    simulation = SimpleNamespace(world=SimpleNamespace(scene=scene), submit=submitted.append, reject=rejected.append)
-    ToolInputs(SimpleNamespace(subscription=subscribe), parameters, simulation, lambda: True)
+    world = SimpleNamespace(scene=scene)
+    simulation = SimpleNamespace(world=world, submit=submitted.append, reject=rejected.append, pacing="realtime", frame=0.02)
 
     def tell(topic, *frames):
         heard[topic](SimpleNamespace(transforms=[frame_to_transform(frame) for frame in frames]))
 
+    def start(last=lambda: None):
+        ToolInputs(SimpleNamespace(subscription=subscribe), parameters, simulation, lambda: True, last=last)
+        return tell, submitted, rejected
+
+    return start
+
+
+def test_a_tool_follows_its_frame_in_tf(follow):
+    tell, submitted, rejected = follow()
     tell("/tf", Frame("tcp", "arm", np.array([0.0, 0.0, 0.1]), NO_TURN, 0.5))
     assert not submitted, "not connected to the world yet"
     tell("/tf_static", Frame("base", "world", np.array([1.0, 0.0, 0.0]), NO_TURN))
@@ -219,3 +229,16 @@ def test_a_tool_follows_its_frame_in_tf(monkeypatch):
     tell("/tf", Frame("arm", "base", np.array([0.0, np.nan, 1.0]), TURNED, 0.9))
     assert [error.reason for error in rejected] == ["not_finite"]
     assert len(submitted) == 1
+
+
+def test_frames_stamped_ahead_do_not_stand_for_what_the_arm_tells(follow):
+    """As that of the odometry in the map, which localisation tells twice a second for the second to come."""
+    last = SimpleNamespace(time=0.0)
+    tell, submitted, _ = follow(lambda: last)
+    for k in range(100):
+        last.time = 0.01 * k
+        if k % 50 == 0:
+            tell("/tf", Frame("odom", "world", np.zeros(3), NO_TURN, last.time + 1.0))
+        tell("/tf", Frame("tcp", "odom", np.array([0.0, 0.0, last.time]), NO_TURN, last.time))
+    assert len(submitted) == 100
+    assert [command.position[2] for command in submitted[1:]] == pytest.approx([command.time for command in submitted[1:]])
