@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
 from nav_msgs.msg import MapMetaData
 from sensor_msgs.msg import Image, PointCloud2
 
@@ -19,6 +20,7 @@ from sand_sim.node.rate import Rate
 from sand_sim.world import World
 
 _MOST_WAITING = 5  # as many as are kept for a reader
+_MOST_CELLS = 10_000_000  # of a height map, 40 MB
 
 
 class BedOutputs:
@@ -30,6 +32,9 @@ class BedOutputs:
         world: that is shown, with at least one grain or fill.
         on_error: called with what goes wrong in the thread.
 
+    Raises:
+        ValueError: if the height map that is asked for would have too many cells.
+
     Attributes:
         dropped: observations that were not told because the thread was busy with earlier ones.
     """
@@ -40,7 +45,7 @@ class BedOutputs:
         self._heights = connections.publisher(Image, "~/heights")
         self._grid = connections.publisher(MapMetaData, "~/heights_grid", latched=True)
         self._points_rate, self._heights_rate = Rate(), Rate()
-        self._low, self._cell, self._shape = bed_grid(world.scene, world.observe().grains, parameters["heights_cell"] or None)
+        self._low, self._cell, self._shape = _grid(world, parameters["heights_cell"])
         self._grid.publish(grid_to_metadata(self._low, self._cell, self._shape))
         self.dropped = 0
         self._waiting: deque[tuple[Observation, bool, bool]] = deque()
@@ -104,3 +109,15 @@ class BedOutputs:
     def _publish_heights(self, observation: Observation) -> None:
         heights = make_height_map(observation.spheres, self._low, self._cell, self._shape).heights
         self._heights.publish(heights_to_image(heights, observation.time, self._parameters["frame_id"]))
+
+
+def _grid(world: World, asked: float) -> tuple[np.ndarray, float, tuple[int, int]]:
+    """Low corner, cell and shape of the height map; a cell that nobody has asked for is as large as it must be."""
+    scene, grains = world.scene, world.observe().grains
+    low, cell, shape = bed_grid(scene, grains, asked or None)
+    least = cell * float(np.sqrt(np.prod(shape, dtype=float) / _MOST_CELLS))
+    if least <= cell:
+        return low, cell, shape
+    if asked:
+        raise ValueError(f"parameter heights_cell: {asked:g} m makes too many cells for a map; give at least {1.1 * least:.2g} m")
+    return bed_grid(scene, grains, 1.01 * least)

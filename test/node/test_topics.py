@@ -24,6 +24,7 @@ from msg_adapters.geometry_msgs import command_to_twist, frame_to_transform, wre
 from msg_adapters.sensor_msgs import cloud_to_points, image_to_heights
 from sand_sim import rotation
 from sand_sim.border import Frame, ToolVelocity
+from sand_sim.node import bed_outputs
 from sand_sim.node.tool_inputs import ToolInputs
 
 TOOL = "/sand_sim/tools/plate"
@@ -117,6 +118,15 @@ def test_heights_and_their_grid(client, start_node):
     assert np.isfinite(heights).sum() >= 9
 
 
+def test_a_height_map_that_nobody_has_asked_for_is_no_larger_than_it_may_be(client, start_node, monkeypatch):
+    monkeypatch.setattr(bed_outputs, "_MOST_CELLS", 8)
+    start_node(pacing="lockstep")
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    grids = hear(client, MapMetaData, "/sand_sim/heights_grid", latched)
+    client.wait_for(lambda: grids)
+    assert grids[-1].height == grids[-1].width == 3, "in whole cells"
+
+
 def test_poses_in_fixed_frames(client, start_node):
     parameters = {
         "frame_names": ["base", "mast"],
@@ -152,6 +162,7 @@ def test_poses_in_fixed_frames(client, start_node):
         ({"tools.plate.frame": "world"}, "tools.plate.frame: 'world' is the world frame; give the tool a frame of its own"),
         ({"frame_names": ["plate"]}, "tools.plate.frame: 'plate' is a frame of frame_names already; give the tool its own"),
         ({"frame_id": "plate"}, "tools.plate.frame: 'plate' is the world frame; give the tool a frame of its own"),
+        ({"heights_cell": 1e-6}, "heights_cell: 1e-06 m makes too many cells for a map; give at least 1.4e-05 m"),
         ({"tools.plate.source": "telepathy"}, "tools.plate.source: unknown 'telepathy'; known are pose, twist, tf"),
     ],
 )
