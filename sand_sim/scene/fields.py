@@ -72,9 +72,9 @@ class Field:
             raise self.refuse(f"must be {' and '.join(bounds)}{_in(unit)}, got {number:g}")
         return number
 
-    def whole(self, least: int) -> int:
-        """A whole number of at least ``least``."""
-        number = self.number(least=least)
+    def whole(self, least: int, most: float = math.inf) -> int:
+        """A whole number of at least ``least`` and at most ``most``."""
+        number = self.number(least=least, most=most)
         if number != int(number):
             raise self.refuse(f"must be a whole number, got {number:g}")
         return int(number)

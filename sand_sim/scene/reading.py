@@ -296,7 +296,7 @@ def _solver(entry: Field) -> Solver:
         integrator=entry.optional("integrator", lambda f: f.choice(INTEGRATORS), VERLET),
         precision=entry.optional("precision", lambda f: f.choice(PRECISIONS), "single"),
         device=entry.optional("device", Field.text, "auto"),
-        threads=auto("threads", lambda f: f.whole(1)),
+        threads=auto("threads", lambda f: f.whole(1, 4096)),
         force_time_step=forced,
     )
 

@@ -71,6 +71,7 @@ def test_good_scene_is_read():
         (("tools", "sch\u00fcrfe"), GOOD["tools"]["spade"], "a tool's name becomes part of its topics"),
         (("contact",), {"normal": "hertzz"}, "contact.normal: unknown 'hertzz'; known are"),
         (("solver",), {"time_step": -1}, "solver.time_step: must be greater than 0 [s]"),
+        (("solver",), {"threads": 1e9}, "solver.threads: must be at least 1 and at most 4096, got 1e+09"),
         (("solver",), {"precision": "half"}, "solver.precision: unknown 'half'"),
         (("gravity",), [0, 0], "gravity: must be a list of 3 numbers"),
         (("domain",), {"low": [0, 0, 0], "high": [0.05, 1, 1]}, "domain: must contain the region of fill"),
