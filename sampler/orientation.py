@@ -12,51 +12,82 @@ _VOTERS = 100  # largest faces of a piece, which tell what side of it is the ins
 def agree_faces(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, int]:
     """Turn faces so that neighbours run along their common edges in opposite directions.
 
-    Where more than two faces share an edge, those next to one another around it should agree, and do if two of them are one face
-    of two solids and as many run along it one way as the other; a majority of such edges decides for each pair of pieces.
+    Where more than two faces share an edge and as many run along it one way as the other, they agree as they are: solids touch or
+    overlap there. Elsewhere those next to one another around it should agree; a majority of such edges decides for each pair of
+    pieces.
 
     Returns:
         Faces, shape (n, 3); component of each, shape (n,); piece without many-sided edges that each belongs to, shape (n,);
         number of faces turned; number of edges that contradict the rest.
     """
-    edges = edges_of(faces)
+    edges, area = edges_of(faces), Surface.areas_of(vertices[faces])
     pair = edges.of(2)
     a, b = edges.face[pair].T
     turn = edges.forward[pair[:, 0]] == edges.forward[pair[:, 1]]
     group, turned, clashes = link_items(len(faces), a, b, turn)
-    piece = group
+    piece, turned = group, _as_most_is(turned, group, area)
     if np.any(edges.degree > 2):
-        a, b, turn = _many_sided(vertices, faces, edges, group, turned)
-        joined, flip, _ = link_items(int(group.max()) + 1, a, b, turn)
-        turned, group = turned ^ flip[group], joined[group]
-    area = Surface.areas_of(vertices[faces])
-    minority = 2.0 * np.bincount(group, area * turned) > np.bincount(group, area)
-    turned ^= minority[group]
+        sound, *links = _sound_pieces(edges, group, turned, area)
+        voted = _votes(vertices, faces, edges, group, turned, sound)
+        links = np.concatenate([[*links, 0 * links[0]], voted], axis=1)
+        joined, flip, _ = link_items(len(sound), *links)
+        group = joined[group]
+        turned = _as_most_is(turned ^ flip[piece], group, area)
     return np.where(turned[:, None], faces[:, ::-1], faces), group, piece, int(turned.sum()), clashes
 
 
-def _many_sided(vertices: np.ndarray, faces: np.ndarray, edges: Edges, group: np.ndarray, turned: np.ndarray):
-    """Pairs of pieces that meet at edges with more than two faces, most decided first, and whether one of them must be turned."""
+def _as_most_is(turned: np.ndarray, group: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """Which faces to turn where that of a group is right as it is of which there is more area."""
+    return turned ^ (2.0 * np.bincount(group, area * turned) > np.bincount(group, area))[group]
+
+
+def _sound_pieces(edges: Edges, piece: np.ndarray, turned: np.ndarray, area: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Pieces that, with all they hang together with, agree as they are, and which of them belong together.
+
+    A piece that is closed by itself belongs to no other. Neither do partitions and fins: without them the others agree.
+
+    Returns:
+        Whether a piece is one, shape (pieces,); pairs that belong together, shape (n,) twice.
+    """
+    number = int(piece.max()) + 1
+    half = np.flatnonzero(edges.degree[edges.edge] > 2)
+    runs = np.where(edges.forward[half] ^ turned[edges.face[half]], 1, -1)
+    ends, which = np.unique(np.column_stack([edges.edge[half], piece[edges.face[half]]]), axis=0, return_inverse=True)
+    own = np.bincount(which.ravel(), runs).astype(int)  # how many more faces of a piece run one way along an edge
+    ends, own = ends[own != 0], own[own != 0]
+    edge, owner = np.unique(ends[:, 0], return_inverse=True)[1], ends[:, 1]
+    surplus = np.bincount(edge, own, 1).astype(int)
+    order = np.argsort(owner, kind="stable")
+    begin = np.searchsorted(owner[order], np.arange(number + 1))
+    loose = np.zeros(number, bool)
+    for p in np.argsort(np.bincount(piece, area), kind="stable") if surplus.any() else ():
+        mine = order[begin[p] : begin[p + 1]]
+        if len(mine) and np.all(surplus[edge[mine]] == own[mine]):
+            loose[p], surplus[edge[mine]] = True, 0
+    beside = np.flatnonzero(edge[1:] == edge[:-1])
+    cluster, _, _ = link_items(number, owner[beside], owner[beside + 1])
+    sound = np.ones(number, bool)
+    sound[cluster[owner[surplus[edge] != 0]]] = False
+    sound = sound[cluster]
+    kept = np.flatnonzero(sound[owner] & ~loose[owner])
+    beside = np.flatnonzero(edge[kept[1:]] == edge[kept[:-1]])
+    return sound, owner[kept[beside]], owner[kept[beside + 1]]
+
+
+def _votes(vertices, faces, edges: Edges, group: np.ndarray, turned: np.ndarray, sound: np.ndarray) -> np.ndarray:
+    """Pairs of other pieces that meet at edges, most decided first, and whether one of them must be turned; shape (3, n) int."""
     votes: dict[tuple[int, int], int] = {}
-    several = np.unique(edges.face[edges.degree[edges.edge] > 2])
-    _, same, count = np.unique(np.sort(faces[several], axis=1), axis=0, return_inverse=True, return_counts=True)
-    twin = np.zeros(len(faces), bool)
-    twin[several] = count[same.ravel()] > 1
-    for k in np.flatnonzero(edges.degree > 2):
-        pieces = group[edges.face[edges.start[k] : edges.start[k + 1]]]
-        if np.all(pieces == pieces[0]):
-            continue
+    for k in np.unique(edges.edge[(edges.degree[edges.edge] > 2) & ~sound[group[edges.face]]]):
         half = halves_around(vertices, faces, edges, k)
-        face = edges.face[half]
-        runs = edges.forward[half] ^ turned[face]
-        agree = twin[face].any() and 2 * runs.sum() == len(runs)
-        for p, q, alike in zip(group[face], np.roll(group[face], -1), runs == np.roll(runs, -1), strict=True):
+        half = half[~sound[group[edges.face[half]]]]
+        pieces, runs = group[edges.face[half]], edges.forward[half] ^ turned[edges.face[half]]
+        agree = 2 * runs.sum() == len(runs)
+        for p, q, alike in zip(pieces, np.roll(pieces, -1), runs == np.roll(runs, -1), strict=True):
             if p != q:
                 pair = int(min(p, q)), int(max(p, q))
                 votes[pair] = votes.get(pair, 0) + (1 if alike and not agree else -1)
     ranked = sorted((pair for pair in votes if votes[pair]), key=lambda pair: -abs(votes[pair]))
-    a, b = (np.array([pair[k] for pair in ranked], int) for k in (0, 1))
-    return a, b, np.array([votes[pair] > 0 for pair in ranked], bool)
+    return np.array([(*pair, votes[pair] > 0) for pair in ranked], int).reshape(-1, 3).T
 
 
 def face_outward(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray, sheet: np.ndarray) -> tuple[np.ndarray, int]:

@@ -7,6 +7,7 @@ from shapes import THIN, damaged, far_from_surface, grid_around, robot_mesh, sol
 
 from sampler import SignedDistance, read_mesh, repair_mesh
 from sampler.mass import integrate
+from sampler.repair import SHEET
 
 HARMLESS = ("flipped", "doubled", "doubled with backs", "cracked", "missing")
 
@@ -124,6 +125,25 @@ def test_a_wall_between_touching_solids_is_no_surface():
     both = trimesh.util.concatenate([left, right])
     assert repair_mesh(both).report.steps["duplicate faces dropped"] == 4
     assert SignedDistance(both).query([[0.5, 0, 0]])[0] == pytest.approx([-0.5])
+
+
+def test_levels_of_detail_with_common_edges_stay_as_they_are():
+    levels = [trimesh.creation.cylinder(0.3, 1.0, sections=sections) for sections in (8, 16, 32, 64)]
+    together = trimesh.util.concatenate(levels)
+    assert repair_mesh(together).report.steps["faces turned"] == 0
+    assert signs(together, levels[-1]) == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_partition_that_shares_its_edges_with_the_shell_is_told_from_it(turned):
+    boxes = [trimesh.creation.box((1.0, 1.0, 1.0)).apply_translation([x, 0, 0]) for x in (-0.5, 0.5)]
+    between = [np.all(box.vertices[box.faces][:, :, 0] == 0.0, axis=1) for box in boxes]
+    wall = boxes[0].triangles[between[0]][:, :: -1 if turned else 1]
+    shell = np.concatenate([box.triangles[~side] for box, side in zip(boxes, between, strict=True)])
+    repaired = repair_mesh(loose(np.concatenate([shell, wall])))
+    assert (repaired.kind == SHEET).sum() == 2
+    assert repaired.report.steps["faces turned"] == repaired.report.steps["holes closed"] == 0
+    assert signs(loose(np.concatenate([shell, wall])), loose(shell)) == [0.0, 0.0]
 
 
 @pytest.mark.parametrize("size", [1e-4, 1.0, 1e4])
