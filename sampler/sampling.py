@@ -226,16 +226,18 @@ def _spacing(radius, spacing, count, grain, triangles) -> float:
 
 
 def _mass(solid, free, parent, layers, plates) -> tuple[float, np.ndarray, np.ndarray, list[str]]:
-    """From all triangles of the solid where none is buried or lies on another, else from its free parts; and from plates.
+    """From all triangles of the solid where all are free, apart and outward, else from its free parts; and from plates.
 
     Returns:
         Volume [m^3], centre, shape (3,) [m], inertia for a density of one, shape (3, 3) [m^5]; warnings.
     """
     whole = np.bincount(parent, minlength=len(solid.triangles)) == (solid.areas > 0.0)
+    turned = np.einsum("ij,ij->i", Surface.normals_of(free), solid.normals[parent]) < 0.0
     pieces, share, warnings = solid.triangles, np.ones(len(solid.triangles)), []
-    if not np.all(whole) or np.any(layers > 1):
+    if not np.all(whole) or np.any(layers > 1) or turned.any():
         pieces, share = free, 1.0 / layers
-        warnings.append("parts of the surface are buried in others; volume and inertia are those of the union")
+        why = "inside out, since it crosses itself" if turned.any() else "buried in others"
+        warnings.append(f"parts of the surface are {why}; volume and inertia are those of the union")
     every = np.concatenate([pieces, plates])
     volume, centre, inertia = integrate(every, np.append(share, np.ones(len(plates)))) if len(every) else (0.0, every, every)
     corners = np.concatenate([solid.triangles, plates]).reshape(-1, 3)

@@ -95,13 +95,14 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
         spacing: of the particles to come [m].
 
     Returns:
-        Shape (m, 3, 3) [m]; the given triangle that each is part of, shape (m,); how many lie on one another there, shape (m,).
+        Outward, shape (m, 3, 3) [m]; the given triangle that each is part of, shape (m,); how many lie on one another there,
+        shape (m,).
     """
     parent = np.flatnonzero(Surface.areas_of(triangles) > 0.0)
     triangles = triangles[parent]
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
-    free, layers = _ask(places, normals, around)
-    if free.all() and np.all(layers == 1):
+    free, layers, inverted = _ask(places, normals, around)
+    if free.all() and np.all(layers == 1) and not inverted.any():
         return triangles, parent, np.ones(len(parent), int)
     most = len(triangles) // 2 + max(_MOST * float(Surface.areas_of(triangles).sum()) / spacing**2, _ENOUGH)
     pieces, parents, cuts = [], [], 0
@@ -125,7 +126,8 @@ def free_triangles(triangles: np.ndarray, around: Surface, spacing: float) -> tu
     pieces.append(triangles)
     parents.append(parent)
     pieces, parents = np.concatenate(pieces), np.concatenate(parents)
-    free, layers = _ask(pieces.mean(axis=1), Surface.normals_of(pieces), around)
+    free, layers, inverted = _ask(pieces.mean(axis=1), Surface.normals_of(pieces), around)
+    pieces[inverted] = pieces[inverted, ::-1]
     return pieces[free], parents[free], layers[free]
 
 
@@ -172,7 +174,7 @@ def _folds(triangles: np.ndarray, solid: Surface) -> np.ndarray:
     for weight in _MIDDLE:
         places = np.einsum("nij,i->nj", triangles[fold], weight)
         fold = fold[count_layers(places, normals[fold], solid, _STEP * solid.unit) < 0]
-    return fold
+    return fold[np.abs(winding_before(triangles[fold].mean(axis=1), normals[fold], solid)) > 0.5]  # else turned round before
 
 
 def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.ndarray:
@@ -223,13 +225,16 @@ def winding_before(points: np.ndarray, normals: np.ndarray, around: Surface, ste
     return around.winding(points + step * around.unit * normals, rough=True)
 
 
-def _ask(points: np.ndarray, normals: np.ndarray, around: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Whether places of a surface are free, and how many faces of closed surfaces lie on one another there, at least 1."""
+def _ask(points: np.ndarray, normals: np.ndarray, around: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Whether places of a surface are free, how many faces lie on one another there, at least 1, and whether they look inward.
+
+    Such are faces of parts that a surface which crosses itself turns inside out.
+    """
     before, layers = winding_before(points, normals, around), count_layers(points, normals, around, _STEP * around.unit)
     free = np.abs(before) < 0.5
     turned = np.flatnonzero(~free & (np.abs(before + layers) < 0.5))  # faces inward, it seems; thin slits may feign that
     free[turned] = np.abs(winding_before(points[turned], -normals[turned], around)) < 0.5
-    return free, np.maximum(layers, 1)
+    return free, np.maximum(layers, 1), free & (before < -0.5)
 
 
 def _middle_lines(triangles: np.ndarray, apart: float) -> tuple[np.ndarray, np.ndarray]:
