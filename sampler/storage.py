@@ -55,5 +55,5 @@ def load_body(path: str | Path) -> ParticleBody:
         warnings = tuple(arrays.pop("warnings").tolist())
         values = {name: array if array.ndim else float(array) for name, array in arrays.items()}
         return ParticleBody(**values, evenness=evenness, steps=steps, warnings=warnings)
-    except (OSError, EOFError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
+    except (OSError, EOFError, KeyError, ValueError, TypeError, RuntimeError, zipfile.BadZipFile) as error:
         raise MeshError(f"body {path}: cannot be read: {error}") from None

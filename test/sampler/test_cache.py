@@ -52,7 +52,9 @@ def test_damaged_cache_files_are_replaced(box, folder):
     first = sample_file(box, 0.004)
     (kept,) = folder.iterdir()
     whole = kept.read_bytes()
-    for broken in (b"", whole[: len(whole) // 2], b"\xff" + whole[1:], whole[:-40]):
+    version = whole.index(b"PK\1\2") + 6  # of the ZIP format that is needed
+    unknown = whole[:version] + b"\x63" + whole[version + 1 :]
+    for broken in (b"", whole[: len(whole) // 2], b"\xff" + whole[1:], whole[:-40], unknown):
         kept.write_bytes(broken)
         assert np.array_equal(sample_file(box, 0.004).points, first.points)
         assert load_body(kept).radius == 0.004
