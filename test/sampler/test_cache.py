@@ -48,6 +48,15 @@ def test_other_content_or_options_are_sampled_anew(box, folder):
     assert len(list(folder.iterdir())) == 5
 
 
+def test_meshes_whose_triangles_lie_in_another_file_are_known_by_that(tmp_path):
+    for size in (0.1, 0.2):
+        for name, content in trimesh.exchange.gltf.export_gltf(trimesh.Scene(trimesh.creation.box((size, size, size)))).items():
+            if name != "model.gltf" or size == 0.1:  # its bounds are for the eye only
+                (tmp_path / name).write_bytes(content)
+        body = sample_file(tmp_path / "model.gltf", 0.01)
+        assert body.volume == pytest.approx(size**3, rel=1e-6)
+
+
 def test_damaged_cache_files_are_replaced(box, folder):
     first = sample_file(box, 0.004)
     (kept,) = folder.iterdir()
