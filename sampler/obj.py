@@ -1,8 +1,14 @@
-"""OBJ files as trimesh reads them: an element a line, its keyword first, vertices counted from the beginning of the file."""
+"""OBJ files as trimesh reads them: an element a line, its keyword first, vertices counted from the beginning, convex polygons."""
 
 import re
 
+import numpy as np
+
+from sampler.caps import span_loop
+
 _MARK = b"\xef\xbb\xbf"  # of UTF-8, which some editors put first
+_POLYGON = re.compile(rb"\nf((?: +\d\S*){4,}) *\r?(?=\n)")
+_VERTEX = re.compile(rb"\nv +(\S+) +(\S+) +(\S+)")
 _ODD = re.compile(rb"\n(?:[ \t]+[vf]|[vf]n?\t|f[^\n-]*-)")  # indented, followed by a tab, counted backwards
 
 
@@ -19,7 +25,7 @@ def plain_obj(data: bytes) -> bytes:
     broken = b"\r" in data and data.count(b"\r") != data.count(b"\r\n")
     remarks = any(data[data.rfind(b"\n", 0, found.start()) + 1] in b"vf" for found in re.finditer(rb"#[^\n]*", data))
     if not (continued or broken or remarks or _ODD.search(data)):
-        return data
+        return _without_hollow_polygons(data)
     data = re.sub(rb"#[^\r\n]*", b"", data)
     lines, vertices = [b""], 0
     for line in re.sub(rb"\\(?:\r\n?|\n)", b" ", data).splitlines():
@@ -31,7 +37,40 @@ def plain_obj(data: bytes) -> bytes:
         else:
             continue
         lines.append(b" ".join([keyword, *words]))
-    return b"\n".join([*lines, b""])
+    return _without_hollow_polygons(b"\n".join([*lines, b""]))
+
+
+def _without_hollow_polygons(data: bytes) -> bytes:
+    """Cut polygons that are not convex into triangles of least area; trimesh cuts them like a fan, over their edge and back."""
+    found = list(_POLYGON.finditer(data))
+    words = [line.split() for line in re.sub(rb"/\S*", b"", b"\n".join(polygon.group(1) for polygon in found)).splitlines()]
+    try:
+        vertices = np.array(_VERTEX.findall(data)).reshape(-1, 3).astype(float)
+        corners = np.array([word for polygon in words for word in polygon], bytes).astype(int) - 1
+    except ValueError:  # refused later
+        return data
+    if np.any((corners < 0) | (corners >= len(vertices))):
+        return data
+    sizes = np.array([len(polygon) for polygon in words], int)
+    begin = np.cumsum(sizes) - sizes
+    hollow = np.zeros(len(found), bool)
+    for size in np.unique(sizes):
+        alike = np.flatnonzero(sizes == size)
+        hollow[alike] = ~_are_convex(vertices[corners[begin[alike, None] + np.arange(size)]])
+    parts, done = [], 0
+    for k in np.flatnonzero(hollow):
+        triangles = span_loop(vertices, corners[begin[k] : begin[k] + sizes[k]]) + 1
+        parts += [data[done : found[k].start()], *(b"\nf %d %d %d" % tuple(triangle) for triangle in triangles)]
+        done = found[k].end()
+    return b"".join([*parts, data[done:]])
+
+
+def _are_convex(polygons: np.ndarray) -> np.ndarray:
+    """Whether polygons, shape (m, n, 3), turn one way all around, shape (m,)."""
+    along = np.roll(polygons, -1, axis=1) - polygons
+    turn = np.cross(along, np.roll(along, -1, axis=1))
+    normal = np.cross(polygons - polygons[:, :1], along).sum(axis=1)
+    return np.all(np.einsum("mnj,mj->mn", turn, normal) >= 0.0, axis=1)
 
 
 def _counted_forwards(index: bytes, vertices: int) -> bytes:
