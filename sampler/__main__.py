@@ -40,6 +40,8 @@ def _run(options: argparse.Namespace) -> int:
     for written in (options.output, options.rrd):
         if written and not written.parent.is_dir():
             raise MeshError(f"cannot write {written}: there is no folder {written.parent}")
+        if written and written.is_dir():
+            raise MeshError(f"cannot write {written}: it is a folder; name a file in it")
     recording = None
     if options.rrd:
         from sampler.recording import Recording

@@ -43,6 +43,8 @@ def plain_obj(data: bytes) -> bytes:
 def _without_hollow_polygons(data: bytes) -> bytes:
     """Cut polygons that are not convex into triangles of least area; trimesh cuts them like a fan, over their edge and back."""
     found = list(_POLYGON.finditer(data))
+    if not found:
+        return data
     words = [line.split() for line in re.sub(rb"/\S*", b"", b"\n".join(polygon.group(1) for polygon in found)).splitlines()]
     try:
         vertices = np.array(_VERTEX.findall(data)).reshape(-1, 3).astype(float)

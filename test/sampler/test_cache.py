@@ -124,6 +124,7 @@ def test_command_line(tmp_path):
         ([BUCKET, "--radius", 0.002, "--count", 300, "--grain", 0.001], "could pass"),
         ([BUCKET, "--radius", 0.01, "--density", 0, "--no-cache"], "a density [kg/m^3] or a mass [kg], positive"),
         ([BUCKET, "--radius", 0.01, "-o", "nowhere/bucket.npz"], "cannot write nowhere/bucket.npz: there is no folder nowhere"),
+        ([BUCKET, "--radius", 0.01, "-o", "."], "cannot write .: it is a folder"),
     ],
 )
 def test_command_line_refuses_with_one_line(arguments, reason):
