@@ -42,6 +42,7 @@ class ToolOutputs:
         self._markers = connections.publisher(MarkerArray, f"{topic}/contact_markers")
         self._contacts_rate = Rate()
         self._filter, self._filtered_at = LowPass(parameters["wrench_cutoff"]), -np.inf
+        self._told: Observation | None = None
         cloud = world.observe().grains
         self._diameter = 2.0 * float(np.median(cloud.radius)) if len(cloud) else 0.01
         weight = float(np.median(cloud.mass)) * max(float(np.linalg.norm(world.scene.gravity)), 1.0) if len(cloud) else 1.0
@@ -50,7 +51,10 @@ class ToolOutputs:
     def publish(self, observation: Observation) -> None:
         """Tell all; called in the stepping thread once a frame."""
         time, report = observation.time, observation.tool(self._tool)
-        self._publish_wrenches(report, time)
+        # Where grains are added at the end of a frame it is seen anew, but whoever sums up impulses must not count it again.
+        if observation is self._told or time != self._filtered_at:
+            self._publish_wrenches(report, time)
+        self._told = observation
         self.tell_pose(observation)
         self._carried.publish(Float64(data=report.carried))
         self._swept.publish(Float64(data=report.swept))
@@ -79,12 +83,7 @@ class ToolOutputs:
         return self._parameters[f"tools.{self._tool}.frame"]
 
     def _publish_wrenches(self, report: ToolReport, time: float) -> None:
-        """Mean over the frame, and filtered: in the axes of the world, which do not turn, before it is turned into the tool's.
-
-        Each stamp is told once, or whoever sums up impulses would count the frame again when grains are added at its end.
-        """
-        if time == self._filtered_at:
-            return
+        """Mean over the frame, and filtered: in the axes of the world, which do not turn, before it is turned into the tool's."""
         wrench = np.array([report.world_force, rotation.rotate(report.orientation, report.torque)])
         filtered = self._filter_at(time, wrench)
         frame_id = self._parameters["frame_id"]
