@@ -24,6 +24,7 @@ _ASKED = 4000  # faces are enough to tell that share
 _FEW = 8  # faces of a component in which a hole of three corners is nothing special
 _SCATTERED = 50  # open pieces from which a mesh is likely to be a cracked solid
 _CRUMB = 0.01  # share of the area below which one of many open pieces is part of a cracked surface
+_FLAKE = 1e-6  # below which an open piece has no thickness: no particle would lie on it
 _LOOSE = 0.5  # share of the area in single triangles from which a mesh is a soup
 
 
@@ -48,12 +49,14 @@ class RepairedMesh:
         vertices: shape (n, 3) [m].
         faces: outward, shape (m, 3).
         kind: of each face, ``SOLID``, ``CAP`` (closes a hole, not in the file) or ``SHEET``, shape (m,).
+        closed: all solids are, none is a cracked surface.
         report: what was done.
     """
 
     vertices: np.ndarray
     faces: np.ndarray
     kind: np.ndarray
+    closed: bool
     report: RepairReport
 
     @property
@@ -101,10 +104,12 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     keep = ~sheet[owner]
     loose = sheet.copy()
     crumbs = sheet & (area < _CRUMB * area.sum())
-    if enclosing or (crumbs.sum() > _SCATTERED and sheets == "auto"):
+    closed = not (enclosing or (crumbs.sum() > _SCATTERED and sheets == "auto"))
+    if not closed:
         taken = sheet if enclosing else crumbs
         sheet = sheet & ~taken
         report.warnings.append(f"{taken.sum()} open pieces are taken for parts of one cracked surface")
+    sheet &= area > _FLAKE * area.sum()
     kind = np.where(sheet[component], SHEET, SOLID)
     report.steps["holes closed"] = round(float((1.0 / (corners[keep] - 2)).sum()))  # a loop of n corners takes n - 2 faces
     report.steps["sheets"] = int(sheet.sum())
@@ -117,7 +122,7 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
         faces, kind = _mend_pieces(vertices, faces, kind, piece, asked, report)
     large = Surface.areas_of(vertices[caps[keep & (corners > 3)]]).sum()
     _warn(report, float(large / area.sum()), int((keep & (corners > 3)).sum()), clashes)
-    return RepairedMesh(vertices, faces, kind, report)
+    return RepairedMesh(vertices, faces, kind, closed, report)
 
 
 def _meet(vertices: np.ndarray, joined: np.ndarray) -> np.ndarray:

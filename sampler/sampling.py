@@ -11,7 +11,7 @@ from sampler.errors import MeshError
 from sampler.inset import Inside, inset_triangles
 from sampler.lattice import lattice_spacing, particle_count
 from sampler.limits import MOST, broken_limits, check_scale, too_many
-from sampler.mass import integrate, is_physical
+from sampler.mass import count_inside, integrate, is_physical, joined, openness
 from sampler.measuring import measure_evenness
 from sampler.options import check_options
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
@@ -24,6 +24,7 @@ SPACING = 1.5  # default distance between neighbours in particle radii; below 2 
 _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest grain
 _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
+_OPEN = 0.01  # openness of a surface from which its volume is counted, not integrated
 _WALL_SAMPLES = 4000
 _OUTWARD = 1e-5  # of the diagonal: how far out of its piece a particle is asked what is before it
 _ASIDE = (0.01, 0.03, 0.1, 0.3)  # ways out of the crease between two parts that are tried, in spacings
@@ -82,7 +83,7 @@ def sample_body(
         solid = Surface(closed[owner != SHEET], device)
         plates = free_triangles(repaired.vertices[sheet], solid, fine)[0]
     free, parent, layers = free_triangles(solid.triangles, solid, fine)
-    volume, centre, inertia, doubts = _mass(solid, free, parent, layers, thick_plates(plates, thickness))
+    volume, centre, inertia, doubts = _mass(solid, free, parent, layers, thick_plates(plates, thickness), repaired.closed)
     if solid is not around:
         free = np.concatenate([free, plates])
     elif len(sheet):
@@ -225,7 +226,7 @@ def _spacing(radius, spacing, count, grain, triangles) -> float:
     return fine if grain is None else min(fine, _CLOSED * (radius + grain) / _COVERED)
 
 
-def _mass(solid, free, parent, layers, plates) -> tuple[float, np.ndarray, np.ndarray, list[str]]:
+def _mass(solid, free, parent, layers, plates, closed) -> tuple[float, np.ndarray, np.ndarray, list[str]]:
     """From all triangles of the solid where all are free, apart and outward, else from its free parts; and from plates.
 
     Returns:
@@ -238,8 +239,11 @@ def _mass(solid, free, parent, layers, plates) -> tuple[float, np.ndarray, np.nd
         pieces, share = free, 1.0 / layers
         why = "inside out, since it crosses itself" if turned.any() else "buried in others"
         warnings.append(f"parts of the surface are {why}; volume and inertia are those of the union")
-    every = np.concatenate([pieces, plates])
-    volume, centre, inertia = integrate(every, np.append(share, np.ones(len(plates)))) if len(every) else (0.0, every, every)
+    parts = [integrate(*part) for part in ((pieces, share), (plates, 1.0)) if len(part[0])]
+    if len(pieces) and not (closed and openness(pieces, share) < _OPEN):
+        warnings.append("the surface does not close, so volume and inertia are counted from places inside of it")
+        parts[0] = count_inside(solid)
+    volume, centre, inertia = joined(parts)
     corners = np.concatenate([solid.triangles, plates]).reshape(-1, 3)
     low, high = corners.min(axis=0), corners.max(axis=0)
     if is_physical(volume, centre, inertia, low, high):
