@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from sand_sim.scene.types import SceneError
 from sand_sim.study.impact import Impact
 from sand_sim.study.quantity import Spread, Wrench, choose_quantity, relative, smoothed
 from sand_sim.study.sample import Sample, mean_sample
@@ -52,6 +53,31 @@ def test_spread_errors():
     assert errors["reach"] == pytest.approx(0.01 / np.ptp(reach))
     assert errors["height"] == 0.0
     assert errors["last reach"] == pytest.approx(0.01 / reach[-1])
+
+
+def _flat(make_world, position, velocity, **further):
+    """Grains that lie on a floor, or leave the domain."""
+    boundaries = [{"type": "plane", "material": "wall", "point": [0, 0, 0], "normal": [0, 0, 1]}]
+    domain = {"low": [-0.1, -0.1, -0.1], "high": [0.1, 0.1, 0.1]}
+    further |= {"boundaries": boundaries, "domain": domain, "duration": 0.1, "frame_rate": 50.0}
+    return make_world(position, 0.005, velocity=velocity, **further)
+
+
+def test_grains_that_leave_count_for_the_spread(make_world):
+    """What stays behind may lie alike though half of the grains have left: reach and height tell nothing of them."""
+    stays, leaves = [[-0.05, 0.0, 0.005], [0.05, 0.0, 0.005]], [[-0.05, 0.09, 0.005], [0.05, 0.09, 0.005]]
+    still = Spread().measure(_flat(make_world, stays + leaves, [0.0, 0.0, 0.0]), lambda: None)
+    velocity = [[0.0, 0.0, 0.0]] * 2 + [[0.0, 2.0, 0.0]] * 2
+    halved = Spread().measure(_flat(make_world, stays + leaves, velocity), lambda: None)
+    assert halved.values["mass"] == pytest.approx([0.5] * 5)
+    assert Spread().errors(halved, still)["mass"] == pytest.approx(0.5)
+    assert Spread().errors(still, still)["mass"] == 0.0
+
+
+def test_a_spread_of_nothing_is_refused(make_world):
+    world = _flat(make_world, [[0.0, 0.09, 0.005]], [0.0, 2.0, 0.0])
+    with pytest.raises(SceneError, match=r"domain: all grains have left it at t = 0\.02 s"):
+        Spread().measure(world, lambda: None)
 
 
 def test_mean_of_samples():
