@@ -1,10 +1,10 @@
 """Measure what each choice of a scene costs in run time and accuracy, and recommend the cheapest that is accurate enough.
 
 The scene is run with its time step, stiffness, integrator, precision, contact law, grain shape, grain size and skin varied one
-by one, then with the best of each together. Where there is a closed form (one impact) every run is compared with it. Elsewhere
-single runs are chaotic, and the mean over repeats is compared with that of runs resolved more finely. Repeats differ by chance
-only: seeds, or the moment of a contact within a step. Only the steps are timed, after grains have settled and kernels are
-compiled; settings take turns.
+by one, then with the best of each together. Where there is a closed form (one impact by Hertz's law) every run is compared
+with it. Elsewhere single runs are chaotic, and the mean over repeats is compared with that of runs resolved more finely.
+Repeats differ by chance only: seeds, or the moment of a contact within a step. Only the steps are timed, after grains have
+settled and kernels are compiled; settings take turns.
 """
 
 import argparse

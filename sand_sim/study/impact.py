@@ -22,6 +22,7 @@ class Impact:
     The closed form (Johnson 1985, Contact Mechanics, section 11.4, https://doi.org/10.1017/CBO9781139171731) is that of elastic
     impacts: ``d_max = (15 m* v^2 / (16 E* sqrt(R*)))^(2/5)``, ``F_max = 4/3 E* sqrt(R*) d_max^(3/2)``,
     ``t_c = 4/5 sqrt(pi) Gamma(2/5) / Gamma(9/10) d_max / v``. For others only the rebound is compared, which is the restitution.
+    Scenes with other normal laws, or with cohesion, have none: adhesion changes the peak and takes from the rebound.
     """
 
     def measure(self, world: World, check: Callable[[], None]) -> Sample:
@@ -43,12 +44,14 @@ class Impact:
         mass = _bodies(world)[1]
         return Sample(np.zeros(1), _features(gap, speed, moments, mass), spent, steps, world.time_step, doubts)
 
-    def exact(self, scene: Scene) -> Sample:
-        """The closed form.
+    def exact(self, scene: Scene) -> Sample | None:
+        """The closed form; None where the scene's laws are not Hertz's.
 
         Raises:
-            SceneError: if it does not hold for the scene.
+            SceneError: if it does not hold for what the scene does.
         """
+        if scene.contact.normal != "hertz" or scene.contact.cohesion != "none":
+            return None
         if any(scene.gravity):
             raise SceneError("gravity: the closed form of an impact is that without gravity; use [0, 0, 0]")
         world = World(scene)
@@ -81,7 +84,7 @@ def _time_steps(world: World, steps: int) -> float:
 
 
 def _bodies(world: World) -> tuple[float, float, float, float]:
-    """Effective radius [m], mass [kg] and modulus [Pa] of the two bodies, and their restitution [1]."""
+    """Effective radius [m], mass [kg] and modulus [Pa] of the two bodies, and their restitution [1], NaN if laws ask for none."""
     scene, grains = world.scene, world.observe().grains
     planes = [wall for wall in world.assembly.walls if wall.kind == "plane"]
     owners = [fill.material for fill, number in zip(scene.fills, world.assembly.fill_numbers, strict=True) for _ in range(number)]
@@ -94,7 +97,7 @@ def _bodies(world: World) -> tuple[float, float, float, float]:
     else:
         raise SceneError("an impact is one grain and one plane, or two grains; choose another --quantity")
     pair = pair_numbers(scene, first, second)
-    return float(radius), float(mass), pair.young, pair.given["restitution"]
+    return float(radius), float(mass), pair.young, pair.given.get("restitution", math.nan)
 
 
 def _approach(world: World) -> tuple[float, float]:

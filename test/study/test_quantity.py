@@ -110,3 +110,19 @@ def test_impact_finds_the_closed_form(make_world, bodies, restitution):
         assert set(exact.values) == {"rebound"}
     assert max(Impact().errors(sample, exact).values()) < 5e-3
     assert choose_quantity(world.scene, len(world.observe().grains)) == "impact"
+
+
+@pytest.mark.parametrize("contact", [{"normal": "viscoelastic"}, {"normal": "linear"}, {"cohesion": "dmt"}])
+def test_impacts_by_other_laws_have_no_closed_form(make_world, contact):
+    """Hertz's says nothing of them, so that what is right would look wrong."""
+    world = make_world(
+        [[0, 0, 0.0051]],
+        0.005,
+        velocity=[0, 0, -0.2],
+        contact={"tangential": "none"} | contact,
+        numbers={"viscous_time": 1e-6, "stiffness": 1e4, "adhesion": 0.01},
+        boundaries=[{"type": "plane", "material": "wall", "point": [0, 0, 0], "normal": [0, 0, 1]}],
+        duration=0.005,
+    )
+    assert Impact().exact(world.scene) is None
+    assert 0.3 < Impact().measure(world, lambda: None).values["rebound"] < 1.0
