@@ -6,7 +6,7 @@ import numpy as np
 
 from sampler.surface import Surface
 
-_ACROSS = 80  # cells across the box in which places inside are counted
+_ACROSS = 60  # cells across the box in which places inside are counted
 
 
 @dataclass(frozen=True)
