@@ -237,7 +237,7 @@ def _mass(solid, free, parent, layers, plates, closed) -> tuple[float, np.ndarra
     pieces, share, warnings = solid.triangles, np.ones(len(solid.triangles)), []
     if not np.all(whole) or np.any(layers > 1) or turned.any():
         pieces, share = free, 1.0 / layers
-        why = "inside out, since it crosses itself" if turned.any() else "buried in others"
+        why = "buried in others, or inside out where it crosses itself" if turned.any() else "buried in others"
         warnings.append(f"parts of the surface are {why}; volume and inertia are those of the union")
     parts = [integrate(*part) for part in ((pieces, share), (plates, 1.0)) if len(part[0])]
     if len(pieces) and not (closed and openness(pieces, share) < _OPEN):
