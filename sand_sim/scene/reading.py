@@ -13,7 +13,7 @@ from sand_sim.precision import PRECISIONS
 from sand_sim.scene.checking import check_scene
 from sand_sim.scene.fields import Field
 from sand_sim.scene.reading_bodies import read_body
-from sand_sim.scene.reading_boundaries import read_boundary, read_corners
+from sand_sim.scene.reading_boundaries import FASTEST, read_boundary, read_corners
 from sand_sim.scene.reading_poses import read_pose
 from sand_sim.scene.shapes import SPHERE, TETRAHEDRON
 from sand_sim.scene.types import (
@@ -242,7 +242,7 @@ def _tool(name: str, entry: Field) -> Tool:
         scale=entry.optional("scale", lambda f: f.number(above=0.0), 1.0),
         thickness=entry.optional("thickness", lambda f: f.number(above=0.0, unit="m"), None),
         pose=entry.optional("pose", read_pose, initial),
-        max_speed=entry.optional("max_speed", lambda f: f.number(above=0.0, most=1e4, unit="m/s"), 2.0),
+        max_speed=entry.optional("max_speed", lambda f: f.number(above=0.0, most=FASTEST, unit="m/s"), 2.0),
         trajectory=tuple(track),
     )
 

@@ -28,7 +28,7 @@ _OPTIONAL = {
     "plunger": ("radius", "velocity", "force", "mass", "max_speed", "travel", "rough"),
     "terrain": ("mesh", "heights", "spacing", "scale", "pose"),
 }
-_FASTEST = 1e4  # [m/s], as of tools: faster ones leave no time step
+FASTEST = 1e4  # [m/s] of plungers and tools: faster ones leave no time step
 _HEIGHT_FILES = (".npz", ".csv", ".png")
 
 
@@ -115,13 +115,13 @@ def _drive(entry: Field) -> Drive:
         for name in ("mass", "max_speed"):
             if name in entry:
                 raise entry[name].refuse("goes with 'force'; a plunger with a 'velocity' keeps it whatever the grains do")
-        return Drive(velocity=entry["velocity"].number(least=-_FASTEST, most=_FASTEST, unit="m/s"), travel=travel)
+        return Drive(velocity=entry["velocity"].number(least=-FASTEST, most=FASTEST, unit="m/s"), travel=travel)
     if "max_speed" not in entry:
         raise entry.refuse("the field 'max_speed' [m/s] is missing; it limits how fast 'force' may move the plunger")
     return Drive(
         force=entry["force"].number(unit="N"),
         mass=entry.optional("mass", lambda f: f.number(above=0.0, unit="kg"), None),
-        max_speed=entry["max_speed"].number(above=0.0, most=_FASTEST, unit="m/s"),
+        max_speed=entry["max_speed"].number(above=0.0, most=FASTEST, unit="m/s"),
         travel=travel,
     )
 
