@@ -192,6 +192,31 @@ class ToolContacts:
 
 
 @dataclass(frozen=True)
+class GrainContacts:
+    """All contacts between grains that act now, one row each, those between spheres of two clumps one by one.
+
+    Attributes:
+        first, second: the two grains, as in ``GrainCloud``, shape (n,) [1].
+        point: where the contact is, world frame, shape (n, 3) [m].
+        normal: unit vector from the second into the first, world frame, shape (n, 3) [1].
+        force: of the second on the first, world frame, shape (n, 3) [N].
+        couple: of rolling and twisting resistance on the first, world frame, zero without, shape (n, 3) [N m].
+        overlap: negative where a liquid bridge acts across a gap, shape (n,) [m].
+    """
+
+    first: np.ndarray
+    second: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+    force: np.ndarray
+    couple: np.ndarray
+    overlap: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+@dataclass(frozen=True)
 class BodyReport:
     """Where a free rigid body is and how it moves.
 

@@ -7,11 +7,11 @@ import numpy as np
 from sand_sim import rotation
 from sand_sim.assemble import Assembly, assemble
 from sand_sim.beforehand import find_coarseness, find_fine_surfaces, find_overlap
-from sand_sim.border import CommandError, Health, Observation, ToolContacts, ToolPose, ToolVelocity
+from sand_sim.border import CommandError, GrainContacts, Health, Observation, ToolContacts, ToolPose, ToolVelocity
 from sand_sim.carrying_over import describe_changes, expect_layout, fit
 from sand_sim.changing import Changeable
 from sand_sim.commands import Command, check_command, pose_after
-from sand_sim.contact_reading import observe_tool_contacts
+from sand_sim.contact_reading import observe_grain_contacts, observe_tool_contacts
 from sand_sim.engine.explicit_dem import ExplicitDem, UnstableError
 from sand_sim.engine.state_check import check_layout, check_numbers
 from sand_sim.engine.tools import ToolTrack
@@ -69,8 +69,7 @@ class World(Changeable):
         self._start = start_energy(self.assembly)
         tools = self._solver.arrays.tools
         self._observed_steps, self._observed_wrench = 0, tools.wrench.numpy().copy() if tools else None
-        spheres, poses = observe_spheres(self.assembly), self._poses
-        self._swept = SweptGround(spheres, self.assembly.tools, poses)
+        self._swept = SweptGround(observe_spheres(self.assembly), self.assembly.tools, self._poses)
         self._loaded = replace(self.assembly, solver=None)
         self.identity = describe_scene(self._loaded)
         self._models: dict[tuple[int, str, float], ToolModel] = {}
@@ -207,6 +206,11 @@ class World(Changeable):
         self._index_of(tool)
         self._health()
         return observe_tool_contacts(self.assembly, tool)
+
+    def grain_contacts(self) -> GrainContacts:
+        """Every contact between grains now, with its force: for force chains, coordination numbers and stresses."""
+        self._health()
+        return observe_grain_contacts(self.assembly)
 
     @property
     def _poses(self) -> list[tuple[np.ndarray, np.ndarray]]:
