@@ -203,22 +203,28 @@ def test_files_that_cannot_be_written_at_the_end_are_named(world, tmp_path):
     assert all(any(path.name in line for line in told) for path in recorder.failed)
 
 
+def wait_until(listens):
+    from sand_sim.sinks.viewer import _listens
+
+    begin = time.monotonic()
+    while _listens() != listens:
+        assert time.monotonic() - begin < 60.0
+        time.sleep(0.1)
+
+
 def listener():
     """A program that viewers connect to, in place of a viewer."""
     command = [sys.executable, "-m", "rerun", "--serve-grpc", "--bind", "127.0.0.1", "--port", str(PORT)]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
-    from sand_sim.sinks.viewer import _listens
-
-    begin = time.monotonic()
-    while not _listens():
-        assert time.monotonic() - begin < 60.0
-        time.sleep(0.1)
+    wait_until(listens=True)
     return process
 
 
 def end(process):
+    """Kill it; the program that listens is a child, which goes a little later."""
     os.killpg(process.pid, 9)
     process.wait()
+    wait_until(listens=False)
 
 
 @pytest.mark.xdist_group("processes")

@@ -1,0 +1,51 @@
+"""What ``docs/python.md`` shows is run as it stands there, and gives what it says."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+DOCUMENT = Path(__file__).parents[1] / "docs" / "python.md"
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory):
+    """The names that are there after all blocks have run, one after the other."""
+    names, there = {}, pytest.MonkeyPatch()
+    there.chdir(tmp_path_factory.mktemp("document"))
+    for block in re.findall(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL):
+        exec(block, names)
+    there.undo()
+    return names
+
+
+def test_the_plate_feels_the_sand_that_it_is_pressed_into(shown):
+    depth, force = np.array(shown["depth"]), np.array(shown["force"])
+    assert depth[-1] == pytest.approx(0.013, abs=1e-9)
+    assert np.all(force[depth < -0.005] == 0.0)
+    assert force[-1] > 1.0
+    assert not shown["seen"].health.doubts
+
+
+def test_contacts_give_coordination_and_stress(shown):
+    """Frictional spheres at rest have four contacts each or a little more; stress times volume is what the virial theorem says.
+
+    Where nothing moves, forces times heights add up to nothing: those between grains balance weights, bottom and plate.
+    """
+    assert 3.8 < shown["coordination"] < 5.0
+    world, grains, stress = shown["world"], shown["grains"], shown["stress"]
+    world.restore(shown["state"])
+    mass, height = grains.mass.astype(float), grains.position[:, 2]
+    borne = 9.81 * (mass * height).sum() + shown["seen"].wall("bin/bottom").force[2] * grains.radius.mean()
+    borne -= world.tool_contacts("plate").wrench[0, 2] * (0.03 - 0.005)
+    assert stress[2, 2] * 0.08 * 0.08 * 0.04 == pytest.approx(borne, rel=0.05)
+    assert np.abs(stress - stress.T).max() < 0.1 * stress[2, 2]
+
+
+def test_trials_from_one_state_part_and_go_back_to_it(shown):
+    world, state = shown["world"], shown["state"]
+    assert shown["lifted"][0] != shown["lifted"][1]
+    world.restore(state)
+    again = world.save()
+    assert all(np.array_equal(again[name], state[name]) for name in state)
