@@ -49,3 +49,13 @@ def test_trials_from_one_state_part_and_go_back_to_it(shown):
     world.restore(state)
     again = world.save()
     assert all(np.array_equal(again[name], state[name]) for name in state)
+
+
+def test_a_bed_without_its_walls_slumps(shown):
+    """A block about as high as half its width reaches to about 1 + 1.24 times that ratio (Lube et al. 2004, for round ones)."""
+    free, before = shown["free"].observe(), shown["grains"]
+    assert len(free.grains) == len(before)
+    assert not free.health.doubts
+    ratio = before.position[:, 2].max() / 0.04
+    reached = np.percentile(np.abs(free.grains.position[:, :2]).max(axis=1), 97) / 0.04  # some grains roll farther
+    assert reached == pytest.approx(1.0 + 1.24 * ratio, rel=0.2)
