@@ -64,6 +64,19 @@ def test_torque_free_tumbling(make_bodies, precision, integrator):
     assert world.observe().health.kinetic == pytest.approx(energy, rel=1e-5)
 
 
+def test_contacts_of_two_bodies_are_those_of_their_spheres(make_bodies):
+    """A dumbbell on another one, 10 um deep: F = 4/3 E* sqrt(R*) d^(3/2) at each end, none between the balls of one of them."""
+    balls, deep = [[-0.01, 0.0, 0.0, 0.01], [0.01, 0.0, 0.0, 0.01]], 1e-5
+    upper = {"spheres": balls, "pose": {"position": [0.0, 0.0, 0.02 - deep]}}
+    contacts = make_bodies({"lower": {"spheres": balls}, "upper": upper}).grain_contacts()
+    up = np.where(contacts.first == 1, 1.0, -1.0)
+    assert sorted(contacts.first + contacts.second) == [1, 1]
+    assert sorted(contacts.point[:, 0]) == pytest.approx([-0.01, 0.01], abs=1e-9)
+    assert contacts.overlap == pytest.approx([deep, deep], rel=1e-6)
+    force = 4.0 / 3.0 * 0.5e7 / (1.0 - 0.25**2) * np.sqrt(0.005) * deep**1.5
+    assert up * contacts.force[:, 2] == pytest.approx([force, force], rel=1e-6)
+
+
 def test_off_centre_impact_follows_rigid_body_theory(make_bodies):
     """A dumbbell's sphere hits a smooth floor: ``J = (1 + e) v / (1/m + a^2/I)``, one for translation, one for rotation."""
     spheres = [[-0.02, 0.0, 0.0, 0.005], [0.02, 0.0, 0.0, 0.005]]
