@@ -70,16 +70,23 @@ def build_fresh(precision: Precision) -> wp.Function:
     since touch and half a step on, ``share = xi / |v_n| dt + 1/2``, with the patch it has in the mean over that time; else the
     restitution would depend on where in a step grains meet (by 0.02 at 25 steps a contact). Elastic forces begin at zero and are
     left alone, so that elastic contacts stay reversible.
+
+    A touch of just now is left to the step after, which then stands for a step and a half: grains that are placed touching one
+    another, or touch at the end of a step, do so but for rounding, and must not be taken for grains that touched long ago.
     """
     real, contact_struct = precision.real, contact_type(precision)
 
     @wp.func
     def fresh(contact: contact_struct, dt: real) -> contact_struct:
         advance = -contact.normal_speed * dt
+        just_now = advance * (real(1.0) / real(100.0))
         contact.span = dt
-        if contact.overlap < advance:
+        if contact.overlap < advance + just_now:
             contact.span = contact.overlap / advance * dt
             contact.share = contact.overlap / advance + real(0.5)
+            if contact.overlap < just_now:
+                contact.span = real(0.0)
+                contact.share = real(0.0)
             # The mean of xi^(1/4) up to an overlap is that at (4/5)^4 of it.
             mean = real(256.0) / real(625.0) * contact.share * advance
             contact.inertia = contact.share * wp.sqrt(contact.mass * wp.sqrt(contact.radius * mean))

@@ -59,15 +59,14 @@ RESTITUTIONS = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99]
 LINEAR = {"normal": "linear", "tangential": "linear"}
 
 
-def rebound(make_world, partner, speed, **further):
+def rebound(make_world, partner, speed, radius=RADIUS, gap=1e-3 * RADIUS, **further):
     """Rebound over impact speed of a grain that meets another or a floor, at the automatic time step."""
     further = {"material": {"density": DENSITY, "young": YOUNG, "poisson": POISSON}, "friction": 0.0, "threads": 1} | further
-    gap = 1e-3 * RADIUS
     if partner == "grain":
-        position, velocity = [[0.0, 0.0, 0.0], [2.0 * RADIUS + gap, 0.0, 0.0]], [[speed, 0.0, 0.0], [-speed, 0.0, 0.0]]
-        world = make_world(position, RADIUS, velocity=velocity, **further)
+        position, velocity = [[0.0, 0.0, 0.0], [2.0 * radius + gap, 0.0, 0.0]], [[speed, 0.0, 0.0], [-speed, 0.0, 0.0]]
+        world = make_world(position, radius, velocity=velocity, **further)
     else:
-        world = make_world([[0.0, 0.0, RADIUS + gap]], RADIUS, velocity=[0.0, 0.0, -speed], boundaries=floor(), **further)
+        world = make_world([[0.0, 0.0, radius + gap]], radius, velocity=[0.0, 0.0, -speed], boundaries=floor(), **further)
     contact = world.assembly.time_step.contact
     world.step(round((gap / speed + 8.0 * contact) / world.time_step))
     observation = world.observe()
@@ -95,6 +94,21 @@ def test_restitution_does_not_depend_on_speed_nor_on_the_phase_of_the_touch(make
         speeds = [1.0, 1.01, 1.02, 1.03, 0.1, 0.03]
         out = [rebound(make_world, "grain", v, restitution=0.3, numbers=numbers, contact=contact) for v in speeds]
         assert out == pytest.approx([0.3] * len(speeds), abs=5e-3)
+
+
+@pytest.mark.parametrize("normal", ["hertz", "linear"])
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_restitution_of_what_starts_touching(make_world, normal, precision):
+    """Rounding puts such grains a little apart or a little into one another, and it must not matter which."""
+    numbers = {"stiffness": STIFFNESS, "shear_stiffness": STIFFNESS}
+    contact = LINEAR if normal == "linear" else {}
+    out = [
+        rebound(make_world, partner, speed, radius, 0.0, restitution=0.3, numbers=numbers, contact=contact, precision=precision)
+        for partner in ("grain", "floor")
+        for radius in (0.005, 0.0031)
+        for speed in (1.0, 0.3)
+    ]
+    assert out == pytest.approx([0.3] * len(out), abs=5e-3)
 
 
 @pytest.mark.parametrize("restitution", [1.0, 0.8])

@@ -7,6 +7,8 @@ dict that the laws write to.
 
 import numpy as np
 
+JUST_NOW = 0.01  # of a step
+
 
 def split(vector, normal):
     """Parts along a unit normal and across it."""
@@ -31,11 +33,14 @@ def turned(spring, normal):
 
 def damped(c, p):
     """How long the dampers of this step act over the step, and the overlap they see: from touch to half a step on if bodies met
-    within the step before; the mean of the fourth root of an overlap that grows from zero is that of 0.8^4 of it.
+    within the step before; the mean of the fourth root of an overlap that grows from zero is that of 0.8^4 of it. Where they met
+    in the last hundredth of a step nothing acts until the step after.
     """
     rate, _ = split(c["velocity"], c["normal"])
     since_touch = c["overlap"] / -rate if rate < 0.0 else np.inf
-    if since_touch < p["dt"]:
+    if since_touch < JUST_NOW * p["dt"]:
+        return 0.0, c["overlap"]
+    if since_touch < (1.0 + JUST_NOW) * p["dt"]:
         span = since_touch + 0.5 * p["dt"]
         return span / p["dt"], 0.8**4 * span * -rate
     return 1.0, c["overlap"]
@@ -44,7 +49,10 @@ def damped(c, p):
 def growth(c, p):
     """Time over which springs have grown: a step, or that since touch."""
     rate, _ = split(c["velocity"], c["normal"])
-    return min(p["dt"], c["overlap"] / -rate) if rate < 0.0 else p["dt"]
+    since_touch = c["overlap"] / -rate if rate < 0.0 else np.inf
+    if since_touch < (1.0 + JUST_NOW) * p["dt"]:
+        return since_touch if since_touch > JUST_NOW * p["dt"] else 0.0
+    return p["dt"]
 
 
 def hertz(c, p, memory):
