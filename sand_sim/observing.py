@@ -7,6 +7,7 @@ import numpy as np
 from sand_sim import rotation
 from sand_sim.assemble import Assembly
 from sand_sim.border import BodyReport, GrainCloud, Health, ToolReport, WallReport
+from sand_sim.driven import driven_speed, forces_on_walls, work_of_plungers, work_of_tools
 from sand_sim.integrator import VERLET
 from sand_sim.track import Track
 from sand_sim.trust import find_doubts
@@ -25,7 +26,7 @@ class StartEnergy:
         per_contact: error of the balance for each contact, over the square of its speed [kg].
         grains: in the domain at time zero.
         most_dissipated: largest dissipation seen so far [J].
-        fastest: largest grain speed seen so far [m/s].
+        fastest: largest speed of grains, tools and plungers seen so far [m/s].
     """
 
     total: float
@@ -41,7 +42,8 @@ def start_energy(assembly: Assembly) -> StartEnergy:
     """The balance at time zero and what it may be wrong by.
 
     A contact that begins in the middle of a step is wrong by up to ``(v dt/(2 d_max))^2.5`` of the energy of its impact, 8e-4 for
-    a step of 1/25 contact time. Impacts are as fast as grains have been seen; what a tool may do at most says nothing of them.
+    a step of 1/25 contact time. Impacts are as fast as grains or tools have been seen; what a tool may do at most says nothing of
+    them.
     """
     sums, mass = assembly.solver.measure(), assembly.solver.arrays.grains.motion.numpy()[:, 3]
     return StartEnergy(
@@ -171,15 +173,10 @@ def observe_walls(assembly: Assembly) -> tuple[WallReport, ...]:
     """Forces on all walls at the last step, and where plungers are; terrains come last."""
     arrays, reports = assembly.solver.arrays, []
     if arrays.walls:
-        contacts, surfaces = arrays.wall_list, arrays.walls.numpy()
-        number = contacts.pairs.get()
-        wall = np.searchsorted(surfaces["first"], contacts.partner.numpy()[:number], side="right") - 1
-        force = contacts.force.numpy()[:number, :3].astype(float)
-        totals = np.column_stack([np.bincount(wall, force[:, k], len(assembly.walls)) for k in range(3)]).astype(float)
         states = arrays.plungers.states.numpy() if arrays.plungers else None
-        for one, total, plunger in zip(assembly.walls, totals, surfaces["plunger"], strict=True):
+        for one, total, plunger in zip(assembly.walls, forces_on_walls(assembly), arrays.walls.numpy()["plunger"], strict=True):
             offset, speed = (states[plunger]["offset"], states[plunger]["seen"]) if plunger >= 0 else (0.0, 0.0)
-            reports.append(WallReport(one.name, -total, one.point + offset * one.direction, speed * one.direction))
+            reports.append(WallReport(one.name, total, one.point + offset * one.direction, speed * one.direction))
     for index, ground in enumerate(assembly.grounds, start=len(assembly.tools)):
         reports.append(WallReport(ground.name, arrays.tools.wrench.numpy()[index, 0].copy(), ground.place.copy(), np.zeros(3)))
     return tuple(reports)
@@ -243,12 +240,12 @@ def observe_health(assembly: Assembly, start: StartEnergy, beforehand: tuple[str
         start: energies at time zero; its peaks of dissipation and speed are brought up to date.
         beforehand: doubts that were there before the first step.
     """
-    arrays, chosen, sums = assembly.solver.arrays, assembly.time_step, assembly.solver.measure()
-    work = float(arrays.tools.work.numpy().sum()) if arrays.tools else 0.0
-    work += float(arrays.plungers.states.numpy()["work"].sum()) if arrays.plungers else 0.0
+    chosen, sums = assembly.time_step, assembly.solver.measure()
+    work = float(work_of_tools(assembly).sum() + work_of_plungers(assembly).sum())
     kinetic = sums.translation + sums.rotation
     dissipated = start.total + work - kinetic - sums.height - sums.elastic - sums.carried_off
-    start.most_dissipated, start.fastest = max(start.most_dissipated, dissipated), max(start.fastest, sums.fastest)
+    start.most_dissipated = max(start.most_dissipated, dissipated)
+    start.fastest = max(start.fastest, sums.fastest, driven_speed(assembly))
     slack = start.rounding + sums.touching * start.per_contact * min(start.fastest, chosen.speed) ** 2
     health = Health(
         time_step=chosen.value,

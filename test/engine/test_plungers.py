@@ -67,6 +67,28 @@ def test_elastic_grain_leaves_a_plunger_at_twice_its_velocity(make_world):
     assert world.observe().grains.velocity[0] == pytest.approx([0.0, 0.0, 2.0 * speed], rel=1e-3)
 
 
+def test_a_plunger_that_meets_a_grain_at_rest_makes_no_energy(make_world):
+    """Looked at after every step, as for a tool."""
+    radius, speed, restitution = 0.005, 0.5, 0.6
+    world = make_world(
+        [[0.0, 0.0, radius + 1e-4]],
+        radius,
+        restitution=restitution,
+        friction=0.0,
+        contact={"tangential": "none"},
+        boundaries=[plunger(velocity=speed)],
+        domain=FREE,
+        threads=1,
+    )
+    for _ in range(round(2e-3 / world.time_step)):
+        world.step()
+        observation = world.observe()
+        assert observation.health.doubts == ()
+    mass = float(observation.grains.mass[0])
+    assert observation.health.elastic == 0.0
+    assert observation.health.tool_work == pytest.approx((1.0 + restitution) * mass * speed**2, rel=5e-3)
+
+
 def hit_free_plunger(make_world, restitution, ratio):
     """A grain hits a plunger of ``ratio`` times its mass that no force drives; what is seen afterwards."""
     radius, speed = 0.005, 0.5

@@ -173,6 +173,22 @@ def test_impact_gives_the_restitution_asked(make_smooth_world, restitution, movi
     assert np.abs(velocity[:2]).max() < 1e-9 * speed
 
 
+def test_a_tool_that_meets_a_grain_at_rest_makes_no_energy(make_smooth_world):
+    """Looked at after every step: the energy that the contact begins with is work of the tool, of which nothing is missing."""
+    speed, restitution = 0.5, 0.6
+    world = make_smooth_world(
+        [[0.0, 0.0, RADIUS + 1e-4]], plate(), restitution=restitution, friction=0.0, contact={"tangential": "none"}
+    )
+    world.apply(ToolPose("tool", np.array([0.0, 0.0, 0.01]), np.array([0.0, 0.0, 0.0, 1.0]), 0.01 / speed))
+    for _ in range(round(2e-3 / world.time_step)):
+        world.step()
+        health = world.observe().health
+        assert health.doubts == ()
+        assert health.tool_work == pytest.approx(health.kinetic + health.elastic + health.dissipated, rel=1e-9)
+    assert health.elastic == 0.0
+    assert health.tool_work == pytest.approx((1.0 + restitution) * MASS * speed**2, rel=5e-3)
+
+
 @pytest.mark.parametrize(
     ("direction", "edge"),
     [

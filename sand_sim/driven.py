@@ -1,0 +1,62 @@
+"""What tools and plungers have done to the grains, read from device arrays that the solver has just measured."""
+
+import numpy as np
+
+from sand_sim.assemble import Assembly
+from sand_sim.integrator import VERLET
+
+
+def work_of_tools(assembly: Assembly) -> np.ndarray:
+    """Work of each tool on the grains up to now, for the energy balance, shape (tools,) [J].
+
+    The solver sums up whole steps, each with the force at its begin. Half of the last one's belongs to the force at its end,
+    which is known only now.
+    """
+    tools, dt = assembly.solver.arrays.tools, assembly.time_step.value
+    if tools is None:
+        return np.zeros(0)
+    tracks = tools.tracks.numpy()
+    power = np.einsum("ij,ij->i", tools.wrench.numpy()[:, 0], tracks["velocity"])
+    power += np.einsum("ij,ij->i", tools.wrench.numpy()[:, 1], tracks["spin"])
+    return tools.work.numpy() - 0.5 * dt * np.where(_moving(assembly), power, 0.0) * (assembly.recipe.integrator == VERLET)
+
+
+def work_of_plungers(assembly: Assembly) -> np.ndarray:
+    """Work of each plunger on the grains up to now, shape (plungers,) [J]; its last half step as that of tools."""
+    arrays, dt = assembly.solver.arrays, assembly.time_step.value
+    if arrays.plungers is None:
+        return np.zeros(0)
+    states, walls = arrays.plungers.states.numpy(), arrays.walls.numpy()
+    driven = walls["plunger"] >= 0
+    along = np.einsum("ij,ij->i", forces_on_walls(assembly), walls["direction"])[driven]
+    force = np.zeros(len(states))
+    force[walls["plunger"][driven]] = along
+    return states["work"] - 0.5 * dt * force * states["velocity"] * (assembly.recipe.integrator == VERLET)
+
+
+def driven_speed(assembly: Assembly) -> float:
+    """Speed of the fastest point of all tools and plungers over the last step [m/s]."""
+    arrays, speeds = assembly.solver.arrays, [0.0]
+    if arrays.tools:
+        tracks, extent = arrays.tools.tracks.numpy(), arrays.tools.shapes.numpy()["extent"]
+        rate = np.linalg.norm(tracks["velocity"], axis=1) + np.linalg.norm(tracks["spin"], axis=1) * extent
+        speeds += np.where(_moving(assembly), rate, 0.0).tolist()
+    if arrays.plungers:
+        speeds += np.abs(arrays.plungers.states.numpy()["velocity"]).tolist()
+    return max(speeds)
+
+
+def forces_on_walls(assembly: Assembly) -> np.ndarray:
+    """Forces of the grains on all analytic walls, shape (walls, 3) [N]."""
+    arrays = assembly.solver.arrays
+    contacts, number = arrays.wall_list, arrays.wall_list.pairs.get()
+    wall = np.searchsorted(arrays.walls.numpy()["first"], contacts.partner.numpy()[:number], side="right") - 1
+    force = contacts.force.numpy()[:number, :3].astype(float)
+    return -np.column_stack([np.bincount(wall, force[:, k], len(assembly.walls)) for k in range(3)]).astype(float)
+
+
+def _moving(assembly: Assembly) -> np.ndarray:
+    """Whether each tool has moved in the last step, shape (tools,)."""
+    tracks, dt = assembly.solver.arrays.tools.tracks.numpy(), assembly.time_step.value
+    middle = (assembly.solver.steps_done - 0.5) * dt
+    return (tracks["begin_time"] <= middle) & (middle < tracks["end_time"])
