@@ -4,16 +4,11 @@ import re
 import struct
 from pathlib import Path
 
-import numpy as np
-
 from sampler.errors import MeshError
 from sampler.obj import plain_obj
-from sampler.strips import PLY_TYPES
 
 _POINTER = b"version https://git-lfs"
-_SHOWN = 60  # letters of a line
 _STL_HEADER, _STL_TRIANGLE = 84, 50  # bytes
-_PLY_SIZES = {name: np.dtype(kind).itemsize for name, kind in PLY_TYPES.items()}  # bytes
 
 
 def check_file(path: Path) -> None:
@@ -30,7 +25,7 @@ def check_file(path: Path) -> None:
         raise MeshError(f"mesh {path.name}: is a Git LFS pointer, not a mesh; run 'git lfs pull' where it comes from")
     if not data.strip(b"\0 \r\n\t"):
         raise MeshError(f"mesh {path.name}: is empty")
-    check = {".stl": _check_stl, ".obj": _check_obj, ".ply": _check_ply, ".off": _check_off, ".glb": _check_glb}
+    check = {".stl": _check_stl, ".obj": _check_obj, ".glb": _check_glb}
     check.get(path.suffix.lower(), lambda name, data: None)(path.name, data)
 
 
@@ -82,36 +77,6 @@ def _check_obj(name: str, data: bytes) -> None:
     last = data.rstrip().rsplit(b"\n", 1)[-1].split()
     if last and last[0] == b"v" and len(last) < 4:
         raise MeshError(f"mesh {name}: is cut off in the middle of its last vertex; copy or export it again")
-
-
-def _check_ply(name: str, data: bytes) -> None:
-    head, found, body = data.partition(b"end_header")
-    if not found:
-        raise MeshError(f"mesh {name}: its PLY header has no end; the file is cut off or no PLY file")
-    words = [line.split() for line in head.decode("latin-1").splitlines()]
-    ascii_file = any(line[:2] == ["format", "ascii"] for line in words)
-    needed, number, rows = 0, 0, 0
-    for line in words:
-        if line[:1] in (["element"], ["property"]) and (len(line) < 3 or (line[0] == "element" and not line[2].isdecimal())):
-            shown = " ".join(line)[:_SHOWN]
-            raise MeshError(f"mesh {name}: is corrupt: its header says '{shown}'; export it again")
-        if line[:1] == ["element"]:
-            number = int(line[2])
-            rows += number
-        elif line[:1] == ["property"]:
-            # Lists hold three items where they describe triangles; fewer bytes than that is certainly cut off.
-            needed += number * (_PLY_SIZES.get(line[2], 1) if line[1] == "list" else _PLY_SIZES.get(line[1], 1))
-    held = len([row for row in body.splitlines()[1:] if row.strip()]) if ascii_file else len(body) - 1
-    if held < (rows if ascii_file else needed):
-        raise MeshError(f"mesh {name}: is cut off: its header promises more than it holds; copy or export it again")
-
-
-def _check_off(name: str, data: bytes) -> None:
-    rows = [row.split(b"#")[0].strip() for row in data.splitlines()]
-    words = b" ".join(row for row in rows if row).split()
-    numbers = [int(word) for word in words[1:3] if word.isdigit()]
-    if len(numbers) == 2 and len(words) < 4 + 3 * numbers[0] + 4 * numbers[1]:
-        raise MeshError(f"mesh {name}: is cut off: its header promises more than it holds; copy or export it again")
 
 
 def _check_glb(name: str, data: bytes) -> None:

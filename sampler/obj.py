@@ -5,6 +5,7 @@ import re
 import numpy as np
 
 from sampler.caps import span_loop
+from sampler.polygons import are_hollow
 
 _MARK = b"\xef\xbb\xbf"  # of UTF-8, which some editors put first
 _POLYGON = re.compile(rb"\nf((?: +\d\S*){4,}) *\r?(?=\n)")
@@ -55,24 +56,13 @@ def _without_hollow_polygons(data: bytes) -> bytes:
         return data
     sizes = np.array([len(polygon) for polygon in words], int)
     begin = np.cumsum(sizes) - sizes
-    hollow = np.zeros(len(found), bool)
-    for size in np.unique(sizes):
-        alike = np.flatnonzero(sizes == size)
-        hollow[alike] = ~_are_convex(vertices[corners[begin[alike, None] + np.arange(size)]])
+    hollow = are_hollow(vertices[corners], sizes)
     parts, done = [], 0
     for k in np.flatnonzero(hollow):
         triangles = span_loop(vertices, corners[begin[k] : begin[k] + sizes[k]]) + 1
         parts += [data[done : found[k].start()], *(b"\nf %d %d %d" % tuple(triangle) for triangle in triangles)]
         done = found[k].end()
     return b"".join([*parts, data[done:]])
-
-
-def _are_convex(polygons: np.ndarray) -> np.ndarray:
-    """Whether polygons, shape (m, n, 3), turn one way all around, shape (m,)."""
-    along = np.roll(polygons, -1, axis=1) - polygons
-    turn = np.cross(along, np.roll(along, -1, axis=1))
-    normal = np.cross(polygons - polygons[:, :1], along).sum(axis=1)
-    return np.all(np.einsum("mnj,mj->mn", turn, normal) >= 0.0, axis=1)
 
 
 def _counted_forwards(index: bytes, vertices: int) -> bytes:

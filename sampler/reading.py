@@ -11,8 +11,10 @@ from sampler.checking import check_file, is_text_stl
 from sampler.dae import plain_dae
 from sampler.errors import MeshError
 from sampler.obj import plain_obj
+from sampler.off import read_off
 from sampler.options import is_positive
-from sampler.strips import read_strips
+from sampler.ply import read_ply
+from sampler.polygons import check_corners
 
 # What trimesh says of damage, with a traceback, of normals that nobody looks at too; what matters is told in one line here.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
@@ -38,8 +40,7 @@ def read_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
         raise MeshError(f"mesh {path.name}: scale must be positive, got {scale!r}")
     check_file(path)
     try:
-        mesh = read_strips(path) if path.suffix.lower() == ".ply" else None
-        mesh = _load(path) if mesh is None else mesh
+        mesh = _load(path)
     except MeshError:
         raise
     except ModuleNotFoundError as error:
@@ -61,8 +62,7 @@ def check_mesh(mesh: trimesh.Trimesh, name: str = "mesh") -> trimesh.Trimesh:
         raise MeshError(f"mesh {name}: has no triangles")
     if vertices.shape[1:] != (3,):
         raise MeshError(f"mesh {name}: has a vertex with fewer than three coordinates; export it again")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise MeshError(f"mesh {name}: a face refers to vertex {faces.max()} of {len(vertices)}; the file is corrupt")
+    check_corners(name, faces, len(vertices))
     if not np.all(np.isfinite(vertices[faces])):
         raise MeshError(f"mesh {name}: has vertices that are not finite; export it again")
     if mesh.area <= 1e-14 * float(np.ptp(vertices[faces].reshape(-1, 3), axis=0).max()) ** 2:
@@ -72,6 +72,8 @@ def check_mesh(mesh: trimesh.Trimesh, name: str = "mesh") -> trimesh.Trimesh:
 
 def _load(path: Path) -> trimesh.Trimesh:
     """Everything that trimesh finds in a file, in one mesh, in metres where the file says what its unit is."""
+    if own := {".ply": read_ply, ".off": read_off}.get(path.suffix.lower()):
+        return own(path.name, path.read_bytes())
     if path.suffix.lower() == ".stl" and not is_text_stl(data := path.read_bytes()):
         return _read_stl(data)
     scene = _load_scene(path)

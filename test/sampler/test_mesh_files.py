@@ -80,6 +80,62 @@ def test_triangle_strips_are_read(tmp_path, kind):
     assert mesh.face_normals == pytest.approx(np.tile([0.0, 0.0, 1.0], (5, 1)))
 
 
+ANGLE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]  # a hollow polygon; upright, with a height of one, volume 3 and area 14
+
+
+def angle_prism(first):
+    """Corners and faces of six and of four corners, in the order of the file."""
+    sides = [(k, (k + 1) % 6, (k + 1) % 6 + 6, k + 6) for k in range(6)]
+    points = [(x, y, z) for z in (0, 1) for x, y in np.roll(ANGLE, first, axis=0)]
+    return points, [(5, 4, 3, 2, 1, 0), *sides[:3], (6, 7, 8, 9, 10, 11), *sides[3:]]
+
+
+def rows_of(table):
+    return "".join(" ".join(map(str, row)) + "\n" for row in table)
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian", "off"])
+@pytest.mark.parametrize("first", [0, 1, 2])
+def test_polygons_of_any_size_are_read_and_stay_within_their_edge(tmp_path, kind, first):
+    points, faces = angle_prism(first)
+    counted = [(len(face), *face) for face in faces]
+    path = tmp_path / f"angle.{'off' if kind == 'off' else 'ply'}"
+    if kind == "off":
+        path.write_text("OFF # of an angle\n12 8 0\n" + rows_of(points) + rows_of(counted))
+    else:
+        header = f"ply\nformat {kind} 1.0\nelement vertex 12\nproperty float x\nproperty float y\nproperty float z\n"
+        header += "element edge 1\nproperty int vertex1\nproperty int vertex2\n"
+        header += "element face 8\nproperty list uchar int vertex_indices\nproperty uchar flags\nend_header\n"
+        order = ">" if "big" in kind else "<"
+        body = b"".join(struct.pack(f"{order}B{len(face)}iB", len(face), *face, 7) for face in faces)
+        body = np.array(points, order + "f4").tobytes() + struct.pack(order + "2i", 0, 1) + body
+        text = rows_of(points) + "0 1\n" + rows_of([(*row, 7) for row in counted])
+        path.write_bytes(header.encode() + (text.encode() if kind == "ascii" else body))
+    mesh = read_mesh(path)
+    assert len(mesh.faces) == 20
+    assert mesh.area == pytest.approx(14.0)
+    assert mesh.volume == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("3 6 7 5", "3 6 7 8", "refers to vertex 8 of 8"),
+        ("3 6 7 5", "3 6 -7 5", "refers to vertex -7 of 8"),
+        ("3 6 7 5", "4 6 7 5", "is cut off"),
+        ("OFF", "BOFF", "is no OFF file but begins with 'BOFF'"),
+        ("8 12", "8", "is no OFF file"),
+    ],
+)
+def test_off_that_makes_no_sense_is_refused(tmp_path, old, new, reason):
+    points, faces = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], trimesh.creation.box().faces
+    text = "OFF\n8 12\n" + rows_of(points) + rows_of([(3, *face) for face in faces[:-1]]) + "3 6 7 5\n"
+    assert old in text
+    (tmp_path / "odd.off").write_text(text.replace(old, new, 1))
+    with pytest.raises(MeshError, match=rf"mesh odd\.off: .*{reason}"):
+        read_mesh(tmp_path / "odd.off")
+
+
 @pytest.mark.parametrize("kind", ["stl", "stl_ascii", "ply", "ply_ascii", "off", "glb", "obj"])
 @pytest.mark.parametrize("share", [0.35, 0.6, 0.9])
 def test_files_cut_off_are_refused(tmp_path, kind, share):
