@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from sampler.errors import MeshError
+from sampler.polygons import are_hollow, cut_polygons
 
 _LIBRARIES = rb"library_(?:effects|materials|images|animations|controllers|lights|cameras)"
 _NEEDLESS = re.compile(
@@ -29,13 +30,13 @@ def plain_dae(name: str, data: bytes) -> bytes:
         raise MeshError(f"mesh {name}: is no DAE file but begins with <{root.tag}>")
     if root.find("{*}scene/{*}instance_visual_scene") is None:
         raise MeshError(f"mesh {name}: names no scene, so that none of its geometry has a place; export it again")
-    for left_out in ("instance_controller", "skew"):
+    for left_out in ("instance_controller", "skew", "ph"):
         if root.find(f".//{{*}}{left_out}") is not None:
-            raise MeshError(f"mesh {name}: has <{left_out}>, which cannot be read; bake it into the vertices and export again")
+            raise MeshError(f"mesh {name}: has <{left_out}>, which cannot be read; bake it into plain triangles and export again")
     _check_unit(name, root)
     _check_positions(name, root)
     _check_indices(name, root)
-    return data
+    return ElementTree.tostring(root) if _cut_hollow_polygons(root) else data
 
 
 def _check_unit(name: str, root: ElementTree.Element) -> None:
@@ -56,6 +57,9 @@ def _check_positions(name: str, root: ElementTree.Element) -> None:
         promised, held = array.get("count", "").strip(), str(len(words))
         if promised not in ("", held):
             raise MeshError(f"mesh {name}: is damaged: it promises {promised} coordinates and holds {held}; export it again")
+        accessor = sources[key].find("{*}technique_common/{*}accessor")
+        if accessor is not None and (accessor.get("stride", "3"), accessor.get("offset", "0")) != ("3", "0"):
+            raise MeshError(f"mesh {name}: has something between its coordinates, which cannot be read; export it again")
         try:
             finite = np.all(np.isfinite(np.array(words, np.float32)))
         except ValueError as error:
@@ -72,3 +76,37 @@ def _check_indices(name: str, root: ElementTree.Element) -> None:
         for text in [indices.text or "" for indices in primitive.iterfind("{*}p")]:
             if "-" in text and "-" in "".join(text.split()[offset::stride]):
                 raise MeshError(f"mesh {name}: is damaged: a triangle has a vertex numbered below zero; export it again")
+
+
+def _cut_hollow_polygons(root: ElementTree.Element) -> bool:
+    """Put triangles in place of polygons where any is not convex; pycollada cuts them like a fan, over their edge and back.
+
+    Returns:
+        Whether there were any.
+    """
+    space = root.tag.removesuffix("COLLADA")
+    keyed = {element.get("id"): element for element in root.iterfind(".//*[@id]")}
+    found = False
+    for primitive in [*root.iterfind(".//{*}polylist"), *root.iterfind(".//{*}polygons")]:
+        inputs, counts, indices = (primitive.findall(f"{{*}}{tag}") for tag in ("input", "vcount", "p"))
+        stride = 1 + max((int(one.get("offset", 0)) for one in inputs), default=0)
+        words = [(one.text or "").split() for one in indices]
+        sizes = (
+            [int(size) for one in counts for size in (one.text or "").split()] if counts else [len(p) // stride for p in words]
+        )
+        rows = [word for one in words for word in one]
+        vertex = next((one for one in inputs if one.get("semantic") == "VERTEX"), None)
+        if max(sizes, default=0) < 4 or sum(sizes) * stride != len(rows) or vertex is None:  # pycollada tells what is wrong
+            continue
+        rows, sizes = np.array(rows, np.int64).reshape(-1, stride), np.array(sizes, np.int64)
+        source = keyed[vertex.get("source")[1:]].find("{*}input[@semantic='POSITION']").get("source")
+        points = np.array(keyed[source[1:]].find("{*}float_array").text.split(), float).reshape(-1, 3)
+        corners = rows[:, int(vertex.get("offset", 0))]
+        if corners.max() < len(points) and are_hollow(points[corners], sizes).any():
+            triangles = cut_polygons(points[corners], sizes)
+            for one in [*counts, *indices]:
+                primitive.remove(one)
+            primitive.tag, primitive.attrib["count"] = f"{space}triangles", str(len(triangles))
+            ElementTree.SubElement(primitive, f"{space}p").text = " ".join(map(str, rows[triangles].ravel()))
+            found = True
+    return found

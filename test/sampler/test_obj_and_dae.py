@@ -149,6 +149,8 @@ def test_dae_is_read_whatever_else_is_broken(tmp_path, old, new):
         ("source='#g1-p'", "source='#lost'", "names the coordinates 'lost' and does not hold them"),
         ("<instance_geometry url='#g1'/>", "<instance_controller url='#bones'/>", "has <instance_controller>"),
         ("<translate>4 0 0</translate>", "<skew>45 0 1 0 1 0 0</skew>", "has <skew>"),
+        ("</polylist>", "</polylist><polygons><ph><p>0 0 0</p><h>1 0 0</h></ph></polygons>", "has <ph>"),
+        ("count='8' stride='3'", "count='6' stride='4'", "something between its coordinates"),
         ("<instance_visual_scene url='#s'/>", "", "names no scene"),
         ('"0.5"', '"0,5"', "its unit is '0,5' metres, which is no number"),
         ("COLLADA", "html", "is no DAE file"),
@@ -161,3 +163,22 @@ def test_dae_of_which_a_part_would_be_lost_is_refused(tmp_path, old, new, reason
     (tmp_path / "broken.dae").write_text(text.replace(old, new) if old == "COLLADA" else head + new + tail)
     with pytest.raises(MeshError, match=r"mesh broken\.dae: .*" + re.escape(reason)):
         read_mesh(tmp_path / "broken.dae")
+
+
+@pytest.mark.parametrize("first", range(6))
+@pytest.mark.parametrize("tag", ["polylist", "polygons"])
+def test_hollow_polygons_of_dae_do_not_reach_over_their_edge(tmp_path, first, tag):
+    angle = np.roll([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], first, axis=0)
+    positions = " ".join(f"{x} {y} {z}" for z in (0, 1) for x, y in angle)
+    faces = [[*range(5, -1, -1)], [*range(6, 12)], *((k, (k + 1) % 6, (k + 1) % 6 + 6, k + 6) for k in range(6))]
+    written = [" ".join(f"{corner} 0 0" for corner in face) for face in faces]
+    loops = "".join(f"<p>{face}</p>" for face in written)
+    if tag == "polylist":
+        loops = f"<vcount>6 6{6 * ' 4'}</vcount><p>{' '.join(written)}</p>"
+    text = re.sub("<vcount>.*?</p>", loops, dae_cubes()).replace("polylist", tag)
+    text = re.sub("count='24'>[^<]*", f"count='36'>{positions}", text).replace("count='8'", "count='12'")
+    (tmp_path / "angles.dae").write_text(text)
+    mesh = read_mesh(tmp_path / "angles.dae")
+    assert len(mesh.faces) == 2 * 20
+    assert mesh.area == pytest.approx(2 * 14.0 / 4)
+    assert mesh.volume == pytest.approx(2 * 3.0 / 8)
