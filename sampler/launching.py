@@ -1,8 +1,9 @@
 """Launching a kernel on all cores."""
 
 import os
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import warp as wp
@@ -22,7 +23,16 @@ def launch_shares(kernel, number: int, inputs: list, outputs: list, device: str)
     if cores == 1:
         run(0, number)
         return
-    list(_pool(cores).map(run, cuts[:-1], cuts[1:]))
+    shares = []
+    try:
+        for ends in pairwise(cuts):
+            shares.append(_pool(cores).submit(run, *ends))
+        for share in shares:
+            share.result()
+    finally:  # also at Ctrl-C: arrays must not go while shares write to them
+        for share in shares:
+            share.cancel()
+        wait(shares)
 
 
 @cache
