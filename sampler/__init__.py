@@ -1,15 +1,19 @@
 """From a triangle mesh to a rigid body of evenly spaced surface particles. Knows neither ROS nor sand_sim."""
 
-from sampler.body import ParticleBody
-from sampler.cache import sample_file, sample_mesh
-from sampler.distance import SignedDistance
-from sampler.errors import MeshError
-from sampler.field import DistanceField, make_field
-from sampler.location import locate_mesh, package_prefixes, package_share
-from sampler.reading import read_mesh
-from sampler.repair import repair_mesh
-from sampler.sampling import sample_body
-from sampler.storage import load_body, save_body
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sampler.body import ParticleBody
+    from sampler.cache import sample_file, sample_mesh
+    from sampler.distance import SignedDistance
+    from sampler.errors import MeshError
+    from sampler.field import DistanceField, make_field
+    from sampler.location import locate_mesh, package_prefixes, package_share
+    from sampler.reading import read_mesh
+    from sampler.repair import repair_mesh
+    from sampler.sampling import sample_body
+    from sampler.storage import load_body, save_body
 
 __all__ = [
     "DistanceField",
@@ -28,3 +32,28 @@ __all__ = [
     "sample_mesh",
     "save_body",
 ]
+
+_HOMES = {
+    "DistanceField": "field",
+    "MeshError": "errors",
+    "ParticleBody": "body",
+    "SignedDistance": "distance",
+    "load_body": "storage",
+    "locate_mesh": "location",
+    "make_field": "field",
+    "package_prefixes": "location",
+    "package_share": "location",
+    "read_mesh": "reading",
+    "repair_mesh": "repair",
+    "sample_body": "sampling",
+    "sample_file": "cache",
+    "sample_mesh": "cache",
+    "save_body": "storage",
+}
+
+
+def __getattr__(name: str):
+    """Import public names when they are first used, so that the command line can see to Ctrl-C before the long imports."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'sampler' has no attribute '{name}'")
+    return getattr(import_module(f"sampler.{_HOMES[name]}"), name)

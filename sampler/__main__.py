@@ -1,6 +1,7 @@
 """``python -m sampler MESH --radius R``: make a particle body and say what came out."""
 
 import argparse
+import signal
 import sys
 import time
 from pathlib import Path
@@ -14,6 +15,7 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         0; 1 where the mesh or an option cannot be used; 130 where the user stopped it.
     """
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # imports pass an exception on as anything, or swallow it
     options = _parser().parse_args(arguments)
     try:
         return _run(options)
@@ -35,6 +37,7 @@ def _run(options: argparse.Namespace) -> int:
     from sampler.storage import save_body
 
     start_warp()
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     begin = time.perf_counter()
     path = locate_mesh(options.mesh)
     for written in (options.output, options.rrd):

@@ -133,3 +133,12 @@ def test_command_line_refuses_with_one_line(arguments, reason):
     (line,) = done.stderr.splitlines()
     assert line.startswith("error: ")
     assert reason in line
+
+
+def test_ctrl_c_while_modules_are_imported_is_no_error(tmp_path):
+    (tmp_path / "warp.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhile True:\n    pass\n")
+    command = [sys.executable, "-m", "sampler", str(BUCKET), "--radius", "0.01"]
+    places = {**os.environ, "PYTHONPATH": f"{tmp_path}:{Path(__file__).parents[2]}"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=places)
+    assert done.returncode == -signal.SIGINT, "as a shell is told that the user stopped it"
+    assert not done.stderr
