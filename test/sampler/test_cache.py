@@ -142,3 +142,11 @@ def test_ctrl_c_while_modules_are_imported_is_no_error(tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=places)
     assert done.returncode == -signal.SIGINT, "as a shell is told that the user stopped it"
     assert not done.stderr
+
+
+@pytest.mark.parametrize("buffered", ["", "1"])
+def test_output_that_nobody_reads_is_no_error(buffered):
+    command = f"{sys.executable} -m sampler {BUCKET} --radius 0.01 | true"
+    places = {**os.environ, "PYTHONUNBUFFERED": buffered}
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, env=places)
+    assert not done.stderr
