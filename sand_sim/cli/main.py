@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+from sand_sim.cli.output import UNREAD, perhaps_unread
 from sand_sim.interruption import InterruptedByUserError, Interruption
 
 
@@ -10,9 +11,15 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command line.
 
     Returns:
-        Exit code: 0 done, 1 refused with one line that says why, 130 interrupted.
+        Exit code: 0 done, 1 refused with one line that says why, 130 interrupted, 141 nobody reads on what it tells.
     """
     interruption = Interruption()  # before the long imports
+    with perhaps_unread():
+        return _execute(arguments, interruption)
+    return UNREAD
+
+
+def _execute(arguments: list[str] | None, interruption: Interruption) -> int:
     from sand_sim.checkpoint import CheckpointError
     from sand_sim.cli import bench, demo, pareto, plan, play, run, stability
     from sand_sim.scene.types import SceneError
@@ -29,6 +36,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         interruption.check()
         return options.execute(options, interruption)
+    except BrokenPipeError:
+        raise  # to ``perhaps_unread``
     except (CheckpointError, SceneError, OSError) as error:  # the last, of files that cannot be written
         print(f"sand_sim: {error}", file=sys.stderr)
         return 1

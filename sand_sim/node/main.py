@@ -2,6 +2,7 @@
 
 import sys
 
+from sand_sim.cli.output import perhaps_unread
 from sand_sim.interruption import InterruptedByUserError, Interruption
 
 _USAGE = (
@@ -63,7 +64,8 @@ def main(arguments: list[str] | None = None) -> int:
 def _explain(strange: list[str]) -> int:
     """Say what arguments there are, instead of a run of the usual scene that nobody has asked for; the exit code."""
     if {"-h", "--help"} & set(strange):
-        print(_USAGE)
+        with perhaps_unread():
+            print(_USAGE)
         return 0
     print(f"sand_sim: unknown arguments '{' '.join(strange)}'; {_USAGE}", file=sys.stderr)
     return 1

@@ -1,6 +1,7 @@
 """The command line as users type it."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -49,6 +50,17 @@ def test_run_writes_everything_and_sums_up(tmp_path):
         assert (tmp_path / "results" / f"small.{kind}").stat().st_size > 1000
     for word in ("real-time factor", "peak draft", "energy balance", "largest overlap / radius"):
         assert word in output
+
+
+@pytest.mark.parametrize("buffered", ["", "1"])
+@pytest.mark.parametrize("words", ["sand_sim --help", "sand_sim bench --list", "sand_sim plan impact --json", "sand_sim.node -h"])
+def test_output_that_nobody_reads_is_no_error(tmp_path, words, buffered):
+    if "node" in words:
+        pytest.importorskip("rclpy", reason="needs ROS 2")
+    command = f"{sys.executable} -m {words} | true"
+    places = {**os.environ, "PYTHONUNBUFFERED": buffered}
+    done = subprocess.run(["bash", "-c", command], cwd=tmp_path, env=places, capture_output=True, text=True, check=False)
+    assert "rror" not in done.stderr and "roken" not in done.stderr
 
 
 def test_refusals_are_one_line(tmp_path):
