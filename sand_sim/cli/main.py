@@ -25,6 +25,7 @@ def _execute(arguments: list[str] | None, interruption: Interruption) -> int:
     from sand_sim.scene.types import SceneError
 
     parser = argparse.ArgumentParser(prog="sand_sim", description=__doc__.split(": ", 1)[1])
+    parser.add_argument("--version", action=_Version, nargs=0, help="tell the version")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     for verb in (run, demo, play, plan, pareto, stability, bench):
         name = verb.__name__.rsplit(".", 1)[-1]
@@ -43,6 +44,16 @@ def _execute(arguments: list[str] | None, interruption: Interruption) -> int:
         return 1
     except InterruptedByUserError:
         return 130
+
+
+class _Version(argparse.Action):
+    """Tells the version, which is looked up only then: a source tree that is not installed has none."""
+
+    def __call__(self, parser, *_) -> None:
+        from importlib.metadata import version
+
+        print(f"sand_sim {version('sand_sim')}")
+        parser.exit()
 
 
 if __name__ == "__main__":

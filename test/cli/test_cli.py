@@ -6,6 +6,8 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from scenes import write_small_scene
@@ -34,6 +36,12 @@ def test_help(tmp_path, words):
     code, output, _ = finish(sand_sim(tmp_path, *words))
     assert code == 0
     assert "usage: sand_sim" in output
+
+
+def test_version(tmp_path):
+    code, output, _ = finish(sand_sim(tmp_path, "--version"))
+    assert code == 0
+    assert output.split() == ["sand_sim", ElementTree.parse(Path(__file__).parents[2] / "package.xml").findtext("version")]
 
 
 def test_run_writes_everything_and_sums_up(tmp_path):
