@@ -16,6 +16,7 @@ from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.tool_body import ToolBody
 from sand_sim.grain_table import GrainTable
 from sand_sim.precision import PRECISIONS, Precision
+from sand_sim.scene.checking import check_scene
 from sand_sim.scene.filling import fill_grains
 from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.stable_step import DEEP
@@ -109,12 +110,13 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     """Make grains, walls, tools and the solver of a scene.
 
     Args:
-        scene: checked.
+        scene: from a file or made in Python.
         progress: called with the name of a stage and the share of it that is done, 0 to 1.
 
     Raises:
-        SceneError: if a mesh, a fill or the time step cannot be used; the message names the field.
+        SceneError: if parts do not fit together, or a mesh, a fill or the time step cannot be used; the message names the field.
     """
+    check_scene(scene)  # again: ``dataclasses.replace`` may have changed it since it was read
     tools = [model_tool(tool, scene, progress) for tool in scene.tools]
     grounds = [
         model_ground(one, scene.folder, lambda share, name=one.name: progress(f"sampling {name}", share))

@@ -1,14 +1,16 @@
 """Scene files: what is read, and that every refusal names its field."""
 
 import copy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 from good_scene import GOOD, changed
+from scenes import write_small_scene
 
-from sand_sim import SceneError, load_scene, read_scene
+from sand_sim import SceneError, World, load_scene, read_scene
 from sand_sim.config_folder import config_folder, find_scene
 
 
@@ -124,3 +126,12 @@ def test_orientation_may_be_given_as_roll_pitch_yaw():
 @pytest.mark.parametrize("path", sorted(config_folder().glob("*.yaml")), ids=lambda path: path.stem)
 def test_own_scenes_are_good(path):
     assert load_scene(path).name == yaml.safe_load(path.read_text())["name"]
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [({"fills": ()}, "fills: at least one fill"), ({"pairs": ()}, "pairs: no entry for 'sand' and 'sand'")],
+)
+def test_a_scene_that_was_changed_in_python_is_checked_again(tmp_path, change, named):
+    with pytest.raises(SceneError, match=named):
+        World(replace(load_scene(write_small_scene(tmp_path)), **change))
