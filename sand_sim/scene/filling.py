@@ -16,6 +16,7 @@ from sand_sim.scene.walls import Wall
 
 _GAP = 1.06  # lattice spacing over the largest diameter
 _JITTER = 0.4  # of the gap
+_MOST_PLACES = 30_000_000  # in a region: 3 GB while they are laid out, and many times what a bed has been run with
 _POURED_FRACTION = 0.61  # of solid in a settled bed, a little high so that a fill by height can be struck off
 # What files of grains hold: arrays of an npz file, and the columns of a csv file that make them.
 _COLUMNS = {
@@ -44,7 +45,7 @@ def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -
         return _read_positions(fill, shape, material, index)
     random = np.random.default_rng(fill.seed)
     largest = _largest(fill.size) * (shape.bounding_radius / shape.equal_radius if shape else 1.0)
-    points = _lattice(np.asarray(fill.low, float), np.asarray(fill.high, float), largest, random)
+    points = _lattice(fill, largest, random)
     for wall in walls:
         points = points[_clear(wall, points, largest)]
     wanted = fill.count or _count_for_height(fill, walls, random)
@@ -89,12 +90,19 @@ def _draw(size: SizeDistribution, number: int, random: np.random.Generator) -> n
     return radii
 
 
-def _lattice(low: np.ndarray, high: np.ndarray, radius: float, random: np.random.Generator) -> np.ndarray:
+def _lattice(fill: Fill, radius: float, random: np.random.Generator) -> np.ndarray:
     """Jittered cubic lattice points at least a radius inside the region, lowest first, shape (n, 3) [m]."""
+    low, high = np.asarray(fill.low, float), np.asarray(fill.high, float)
     spacing = 2.0 * radius * _GAP
-    counts = np.floor((high - low - 2.0 * radius) / spacing + 1e-9).astype(int) + 1
     if np.any(high - low < 2.0 * radius):
         return np.zeros((0, 3))
+    counts = np.floor((high - low - 2.0 * radius) / spacing + 1e-9) + 1.0
+    if counts.prod() > _MOST_PLACES:
+        raise SceneError(
+            f"fills: '{fill.name}' has a region with places for {counts.prod():.2g} grains of {radius:.2g} m, at most "
+            f"{_MOST_PLACES:.0e} are laid out; make 'radius' larger, as is usual for models of fine sand, or 'region' smaller"
+        )
+    counts = counts.astype(int)
     axes = [low[k] + radius + (high[k] - low[k] - 2.0 * radius) * _even(counts[k]) for k in range(2)]
     axes.append(low[2] + radius + spacing * np.arange(counts[2]))
     z, y, x = np.meshgrid(axes[2], axes[1], axes[0], indexing="ij")

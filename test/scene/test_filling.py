@@ -56,6 +56,13 @@ def test_grains_keep_clear_of_walls():
     assert np.all(cylinder.distance(table.position) >= 0.005)
 
 
+@pytest.mark.parametrize("radius", [1e-6, 1e-29])
+def test_grains_too_fine_for_their_region_are_refused(radius):
+    """Real sand in a box of some decimetres ended with an error of memory, or without one."""
+    with pytest.raises(SceneError, match=r"'bed' has a region with places for .* grains of 1e-.* m, .*'radius' larger"):
+        fill_grains(fill(size=SizeDistribution("constant", mean=radius), height=0.05), SAND, 0, [])
+
+
 def test_too_many_grains_are_refused():
     with pytest.raises(SceneError, match=r"'bed' has room for \d+ loosely packed grains but 100000 are wanted"):
         fill_grains(fill(count=100_000), SAND, 0, [])
