@@ -10,6 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from msg_adapters.diagnostic_msgs import health_to_diagnostics
 from sand_sim.border import Observation
 from sand_sim.node.lag import LagWatch
+from sand_sim.node.straying import StrayWatch
 from sand_sim.simulation import Simulation
 
 
@@ -24,7 +25,7 @@ class Diagnosis:
 
     def __init__(self, simulation: Simulation, name: str, warn: Callable[[str], None]):
         self._simulation, self._name = simulation, name
-        self._lag = LagWatch(simulation, warn)
+        self._lag, self._strays = LagWatch(simulation, warn), StrayWatch(simulation.world, warn)
         self._before = (time.monotonic(), 0.0)
 
     def tell(self, last: Observation, dropped: int) -> DiagnosticArray:
@@ -42,6 +43,7 @@ class Diagnosis:
             "memory [MB]": f"{_resident_memory() / 1e6:.0f}",
             "commands slowed to max_speed": str(simulation.courses.limited),
             "commands in place of one with the same stamp": str(simulation.courses.alike),
+            "tools outside of the domain": ", ".join(self._strays.look(last.tools)),
             "clouds dropped": str(dropped),
             "commands rejected": str(sum(rejected.values())),
             "last rejection": simulation.last_rejection,

@@ -1,0 +1,37 @@
+"""Tools that have left the domain, where alone grains are: mostly of poses in millimetres, or of another frame."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from sand_sim.border import ToolReport
+from sand_sim.world import World
+
+
+class StrayWatch:
+    """Warns once of each tool that is told to go where nothing is to be felt.
+
+    Args:
+        world: that the tools are in.
+        warn: takes what there is to say.
+    """
+
+    def __init__(self, world: World, warn: Callable[[str], None]):
+        self._world, self._warn = world, warn
+        self._told: set[str] = set()
+
+    def look(self, tools: tuple[ToolReport, ...]) -> list[str]:
+        """Names of the tools that are wholly outside of the domain."""
+        low, high = self._world.assembly.lattice.low, self._world.assembly.lattice.high
+        strayed = []
+        for model, tool in zip(self._world.tools, tools, strict=True):
+            if np.linalg.norm(np.clip(tool.position, low, high) - tool.position) > model.extent:
+                strayed.append(tool.name)
+                if tool.name not in self._told:
+                    self._told.add(tool.name)
+                    self._warn(
+                        f"tool '{tool.name}' has left the domain, {np.round(low, 3).tolist()} to {np.round(high, 3).tolist()} m, "
+                        f"and is at {np.round(tool.position, 3).tolist()} m: no grain is there; see that its poses are in metres "
+                        "and of the frame that they name, or give the scene a larger 'domain'"
+                    )
+        return strayed
