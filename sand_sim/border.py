@@ -315,13 +315,20 @@ class Observation:
     spheres: GrainCloud
 
     def body(self, name: str) -> BodyReport:
-        """The report of a free rigid body by its name."""
-        return next(report for report in self.bodies if report.name == name)
+        """The report of a free rigid body by its name; ``KeyError`` if there is none in the domain."""
+        return _named(name, self.bodies, "body")
 
     def tool(self, name: str) -> ToolReport:
-        """The report of a tool by its name."""
-        return next(report for report in self.tools if report.name == name)
+        """The report of a tool by its name; ``KeyError`` if there is none."""
+        return _named(name, self.tools, "tool")
 
     def wall(self, name: str) -> WallReport:
-        """The report of a wall by its name."""
-        return next(report for report in self.walls if report.name == name)
+        """The report of a wall by its name; ``KeyError`` if there is none."""
+        return _named(name, self.walls, "wall")
+
+
+def _named(name: str, reports: tuple, kind: str):
+    for report in reports:
+        if report.name == name:
+            return report
+    raise KeyError(f"there is no {kind} '{name}'; there are {', '.join(one.name for one in reports) or 'none'}")
