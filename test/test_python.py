@@ -17,3 +17,16 @@ def test_reports_that_are_not_there_are_told(world, kind, known):
     """``StopIteration`` would end the generator of whoever asks, in silence."""
     with pytest.raises(KeyError, match=f"there is no {kind} 'spade'; there are {known}"):
         getattr(world.observe(), kind)("spade")
+
+
+@pytest.mark.parametrize(
+    ("position", "orientation", "told"),
+    [
+        ([0.0, 0.0], [0.0, 0.0, 0.0, 1.0], r"tool 'plate': position must be of shape \(3,\), not \(2,\)"),
+        ([0.0, 0.0, 0.1], [0.0, 0.0, 0.1], r"tool 'plate': orientation must be of shape \(4,\), not \(3,\)"),
+        ([[0.0, 0.0, 0.1]], [0.0, 0.0, 0.0, 1.0], r"tool 'plate': position must be of shape \(3,\), not \(1, 3\)"),
+    ],
+)
+def test_poses_of_another_shape_are_refused(world, position, orientation, told):
+    with pytest.raises(CommandError, match=told):
+        world.apply(ToolPose("plate", np.array(position), np.array(orientation)))
