@@ -197,11 +197,7 @@ class GrainContacts:
 
     Attributes:
         first, second: the two grains, as in ``GrainCloud``, shape (n,) [1].
-        point: where the contact is, world frame, shape (n, 3) [m].
-        normal: unit vector from the second into the first, world frame, shape (n, 3) [1].
-        force: of the second on the first, world frame, shape (n, 3) [N].
-        couple: of rolling and twisting resistance on the first, world frame, zero without, shape (n, 3) [N m].
-        overlap: negative where a liquid bridge acts across a gap, shape (n,) [m].
+        point, normal, force, couple, overlap: as in ``ToolContacts``; normals into the first, forces and couples on it.
     """
 
     first: np.ndarray
@@ -328,7 +324,7 @@ class Observation:
 
 
 def _named(name: str, reports: tuple, kind: str):
-    for report in reports:
-        if report.name == name:
-            return report
-    raise KeyError(f"there is no {kind} '{name}'; there are {', '.join(one.name for one in reports) or 'none'}")
+    found = {report.name: report for report in reports}
+    if name in found:
+        return found[name]
+    raise KeyError(f"there is no {kind} '{name}'; there are {', '.join(found) or 'none'}")
