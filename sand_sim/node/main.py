@@ -16,7 +16,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the node until it is interrupted or its duration is over.
 
     Returns:
-        Exit code: 0, or 1 if the node could not start, or was to end when the run blows up and it did.
+        Exit code: 0, or 1 if the node could not start, was to end when the run blows up and it did, or could not write its files.
     """
     interruption = Interruption()  # before the long imports
     sys.setswitchinterval(_SWITCH_INTERVAL)
@@ -37,7 +37,7 @@ def main(arguments: list[str] | None = None) -> int:
     except RuntimeError as error:
         print(f"sand_sim: arguments after --ros-args: {' '.join(str(error).split())}", file=sys.stderr)
         return 1
-    executor, node = SingleThreadedExecutor(), None
+    executor, node, code = SingleThreadedExecutor(), None, 0
     try:
         interruption.check()
         if strange := remove_ros_args(sys.argv if arguments is None else arguments)[1:]:
@@ -48,9 +48,9 @@ def main(arguments: list[str] | None = None) -> int:
             node.start()
         while not (interruption.asked or node.done):
             _spin(executor, node)
-        return 1 if node.configured and node.simulation.fault else 0
+        code = 1 if node.configured and node.simulation.fault else 0
     except (InterruptedByUserError, ExternalShutdownException):
-        return 0
+        pass
     except (SceneError, ValueError, ParameterException) as error:
         print(f"sand_sim: {error}", file=sys.stderr)
         return 1
@@ -59,6 +59,7 @@ def main(arguments: list[str] | None = None) -> int:
             executor.shutdown()  # it holds on to what it waits for
             node.destroy_node()
         rclpy.try_shutdown()
+    return 1 if node is not None and node.incomplete else code
 
 
 def _explain(strange: list[str]) -> int:

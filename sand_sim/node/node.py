@@ -54,13 +54,14 @@ class SandSimNode(LifecycleNode):
     Attributes:
         configured: whether there is a world.
         done: whether the asked duration has been reached, or the run has blown up and shall end then.
+        incomplete: whether files were asked for that could not be written, or not whole.
         failure: why the last transition failed, None if it did not.
         simulation, recorder: the running world and what it leaves behind, while the node is configured.
     """
 
     def __init__(self, progress=lambda stage, share: None, **node_arguments):
         super().__init__("sand_sim", **node_arguments)
-        self.configured = self.done = self._active = self._held = self._starting = False
+        self.configured = self.done = self.incomplete = self._active = self._held = self._starting = False
         self.failure: Exception | None = None
         self._progress, self._endings = progress, ExitStack()
         try:
@@ -245,6 +246,7 @@ class SandSimNode(LifecycleNode):
     def _finish_files(self) -> None:
         for path in self.recorder.close():
             self.get_logger().info(f"written {path}")
+        self.incomplete = self.incomplete or bool(self.recorder.failed)
 
     def _show(self, observation: Observation) -> None:
         """Called in the stepping thread at the end of each frame."""

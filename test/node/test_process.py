@@ -110,3 +110,12 @@ def test_the_node_can_end_when_a_run_blows_up(start_process, tmp_path):
     assert "stepping has stopped: blown up at t = " in errors
     assert "Traceback" not in errors
     assert (tmp_path / "out" / "small.json").is_file()
+
+
+def test_the_exit_code_tells_of_files_that_could_not_be_written(start_process, tmp_path):
+    write_small_scene(tmp_path)
+    (tmp_path / "small.json").mkdir()
+    process = start_process(scene="small.yaml", pacing="fast", duration=0.1, output=tmp_path)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert "small.json cannot be written" in errors
+    assert process.returncode == 1
