@@ -53,7 +53,8 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     if not summary.is_file():
         return 130 if interruption.asked else node.returncode or 1
     print(f"{scene.name}:\n{summary_text(json.loads(summary.read_text()))}")
-    print("written: " + ", ".join(str(options.out / f"{scene.name}.{kind}") for kind in ("rrd", "png", "npz", "json")))
+    files = [options.out / f"{scene.name}.{kind}" for kind in ("rrd", "png", "npz", "json")]
+    print("written: " + ", ".join(str(file) for file in files if file.is_file()))
     return 130 if interruption.asked else node.returncode
 
 

@@ -137,6 +137,16 @@ def test_demo_drives_the_node_through_ros(tmp_path):
     assert json.loads((tmp_path / "results" / "small.json").read_text())["simulated_s"] == pytest.approx(0.4)
 
 
+def test_demo_without_its_recording_says_so(tmp_path):
+    pytest.importorskip("rclpy", reason="needs ROS 2")
+    scene = write_small_scene(tmp_path, duration=0.1)
+    (tmp_path / "results" / "small.rrd").mkdir(parents=True)
+    code, output, errors = finish(sand_sim(tmp_path, "demo", scene, "--out", "results"))
+    assert code == 1
+    assert "recording results/small.rrd: Is a directory" in errors
+    assert "written: results/small.png, results/small.npz, results/small.json" in output
+
+
 @pytest.mark.parametrize("delay", [0.5, 4.0])
 def test_ctrl_c_ends_the_demo_and_its_processes(tmp_path, delay):
     pytest.importorskip("rclpy", reason="needs ROS 2")
