@@ -70,4 +70,7 @@ def _result(done: concurrent.futures.Future) -> tuple[Any, str]:
     """The error, or None and what was returned."""
     if done.cancelled():
         return "shutting down", ""
-    return done.exception(), "" if done.exception() else str(done.result() or "")
+    if done.exception():
+        return done.exception(), ""
+    result = done.result()
+    return None, f"t = {result:.6f} s" if isinstance(result, float) else str(result or "")

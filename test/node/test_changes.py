@@ -48,7 +48,7 @@ def test_states_are_saved_and_loaded(client, start_node, tmp_path):
     client.send(START - [0.0, 0.0, 0.0362], at=0.3)
     client.wait_for(lambda: client.time > 0.2999)
     assert not np.array_equal(position_of(client, node), kept)
-    assert ask(client, "load_state", name="before")[0]
+    assert ask(client, "load_state", name="before") == (True, "t = 0.100000 s")
     client.wait_for(lambda: client.time == pytest.approx(0.1, abs=1e-4))
     assert np.array_equal(position_of(client, node), kept)
     for name in ("../before", "/etc/passwd", "", ".hidden", "a/b"):
