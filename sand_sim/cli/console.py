@@ -1,5 +1,6 @@
 """Progress on the console: one line that is written over on a terminal, now and then a line elsewhere."""
 
+import os
 import sys
 import time
 
@@ -22,14 +23,23 @@ class Console:
             self.end()
 
     def line(self, text: str, force: bool = False) -> None:
-        """Show one line; where it cannot be written over only every few seconds unless forced."""
+        """Show one line; where it cannot be written over only every few seconds unless forced.
+
+        What the terminal is too narrow for is cut: a line that wraps cannot be written over.
+        """
         now = time.monotonic()
         if self._stream.isatty():
-            print(f"\r\x1b[K{text}", end="", file=self._stream, flush=True)
+            columns = os.get_terminal_size(self._stream.fileno()).columns  # 0 where that is not known
+            print(f"\r\x1b[K{text[: columns - 1] if columns else text}", end="", file=self._stream, flush=True)
             self._open = True
         elif force or now - self._shown > _EVERY:
             print(text, file=self._stream, flush=True)
             self._shown = now
+
+    def tell(self, text: str) -> None:
+        """Show a line that stays, whole."""
+        print(f"\r\x1b[K{text}" if self._open else text, file=self._stream, flush=True)
+        self._open = False
 
     def end(self) -> None:
         """Leave the line as it stands."""

@@ -46,13 +46,9 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         interruption.check()
         console.stage(stage, share)
 
-    def tell(line: str) -> None:
-        console.line(line, force=True)
-        console.end()
-
     checkpoints = None
     if options.checkpoint:
-        checkpoints = CheckpointFolder(options.checkpoint, scene.name, options.checkpoint_period, tell)
+        checkpoints = CheckpointFolder(options.checkpoint, scene.name, options.checkpoint_period, console.tell)
     elif options.resume:
         raise CheckpointError("--resume: give the folder to resume from with --checkpoint FOLDER")
     world = World(scene, progress)
@@ -60,11 +56,13 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     if options.resume:
         checkpoints.resume(world, lambda checkpoint: log.unpack(checkpoint.history))
     elif checkpoints and checkpoints.files():
-        tell(f"{options.checkpoint} holds checkpoints of an earlier run, which this one replaces; --resume would go on from them")
-    recorder = _open_recorder(world, log, options, tell)
+        console.tell(
+            f"{options.checkpoint} holds checkpoints of an earlier run, which this one replaces; --resume would go on from them"
+        )
+    recorder = _open_recorder(world, log, options, console.tell)
     recorder.write(world.observe())
     if world.assembly.time_step.warning:
-        console.line(f"warning: {world.assembly.time_step.warning}", force=True)
+        console.tell(f"warning: {world.assembly.time_step.warning}")
     begin = world.time + 0.5 * world.time_step
     for time in (time for time in frame_times(scene, options.duration) if time > begin):
         try:

@@ -39,6 +39,5 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         print(table_text(result))
         print("written: " + ", ".join(map(str, files)))
     if note:
-        console.line(note, force=True)
-        console.end()
+        console.tell(note)
     return 1 if result.bad else 0
