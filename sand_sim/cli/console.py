@@ -37,8 +37,8 @@ class Console:
             self._shown = now
 
     def tell(self, text: str) -> None:
-        """Show a line that stays, whole."""
-        print(f"\r\x1b[K{text}" if self._open else text, file=self._stream, flush=True)
+        """Show a line that stays, whole, in place of progress that may stand there."""
+        print(f"\r\x1b[K{text}" if self._stream.isatty() else text, file=self._stream, flush=True)
         self._open = False
 
     def end(self) -> None:

@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+from sand_sim.cli.console import Console
 from sand_sim.cli.output import UNREAD, perhaps_unread
 from sand_sim.interruption import InterruptedByUserError, Interruption
 
@@ -40,7 +41,7 @@ def _execute(arguments: list[str] | None, interruption: Interruption) -> int:
     except BrokenPipeError:
         raise  # to ``perhaps_unread``
     except (CheckpointError, SceneError, OSError) as error:  # the last, of files that cannot be written
-        print(f"sand_sim: {error}", file=sys.stderr)
+        Console().tell(f"sand_sim: {error}")
         return 1
     except InterruptedByUserError:
         return 130

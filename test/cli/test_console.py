@@ -10,6 +10,7 @@ import termios
 import pytest
 
 from sand_sim.cli.console import Console
+from sand_sim.cli.main import main
 
 
 @pytest.fixture
@@ -62,3 +63,12 @@ def test_what_is_told_stays_whole(terminal):
     console.end()
     console.tell("last words")
     assert screen(read()) == [100 * "w", "more progress", "last words", ""]
+
+
+def test_an_error_is_not_written_behind_progress(terminal):
+    read, console = terminal(300), Console()
+    console.line("settling  30 %")
+    assert main(["run", "nothing"]) == 1
+    line, rest = screen(read())
+    assert line.startswith("sand_sim: scene 'nothing'")
+    assert not rest
