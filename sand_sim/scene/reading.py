@@ -36,6 +36,7 @@ from sand_sim.scene.types import (
 
 _TOOL_FIELDS = ("mesh", "urdf", "link", "material", "particle_radius", "particle_spacing", "contact", "scale", "thickness")
 _TOOL_FIELDS += ("pose", "max_speed", "trajectory")
+_FEWEST = 0.01  # share of a normal distribution between its limits, so that radii are not drawn for ever
 
 
 class _Loader(yaml.SafeLoader):
@@ -169,6 +170,11 @@ def _size(entry: Field) -> SizeDistribution:
         low = normal.optional("low", Field.number, mean - 2.0 * deviation)
         high = normal.optional("high", Field.number, mean + 2.0 * deviation)
         kind = SizeDistribution("normal", mean=mean, deviation=deviation, low=low, high=high)
+        if low <= high and (share := _share_between(kind)) < _FEWEST:
+            raise normal.refuse(
+                f"of a mean of {mean:g} and a deviation of {deviation:g} only {share:.2g} lie between {low:g} and {high:g} [m], "
+                f"at least {_FEWEST:g} must; move 'low' and 'high' apart, or nearer to the mean"
+            )
     elif "table" in entry.value:
         table = entry.keys(("table",))["table"].keys(("radii", "weights"), ("radii", "weights"))
         radii = tuple(r.number(above=0.0, unit="m") for r in table["radii"].entries())
@@ -181,6 +187,14 @@ def _size(entry: Field) -> SizeDistribution:
     if not 0.0 < kind.low <= kind.high:
         raise entry.refuse(f"radii must be positive and in order, got {kind.low:g} to {kind.high:g} [m]")
     return kind
+
+
+def _share_between(size: SizeDistribution) -> float:
+    """Share of a normal distribution that its limits let through [1]."""
+    if size.deviation == 0.0:
+        return float(size.low <= size.mean <= size.high)
+    below = [math.erf((limit - size.mean) / (math.sqrt(2.0) * size.deviation)) for limit in (size.low, size.high)]
+    return 0.5 * (below[1] - below[0])
 
 
 def _fill(entry: Field, folder: Path) -> Fill:

@@ -45,6 +45,21 @@ def test_good_scene_is_read():
         (("pairs",), [GOOD["pairs"][0]], "pairs: no entry for 'sand' and 'steel'"),
         (("fills", 0, "radius"), -0.005, "fills[0].radius: must be greater than 0 [m]"),
         (("fills", 0, "radius"), {"uniform": [0.2, 0.1]}, "fills[0].radius: radii must be positive and in order"),
+        (
+            ("fills", 0, "radius"),
+            {"normal": {"mean": 0.003, "deviation": 1e-4, "low": 0.004, "high": 0.005}},
+            "fills[0].radius.normal: of a mean of 0.003 and a deviation of 0.0001 only 0 lie between 0.004 and 0.005 [m]",
+        ),
+        (
+            ("fills", 0, "radius"),
+            {"normal": {"mean": 0.003, "deviation": 1e-4, "low": 0.003, "high": 0.003}},
+            "fills[0].radius.normal: of a mean of 0.003",
+        ),
+        (
+            ("fills", 0, "radius"),
+            {"normal": {"mean": 0.003, "deviation": 0.0, "low": 0.004, "high": 0.005}},
+            "fills[0].radius.normal: of a mean of 0.003",
+        ),
         (("fills", 0, "count"), 2.5, "fills[0].count: must be a whole number"),
         (("fills", 0, "height"), 0.05, "fills[0]: give exactly one of 'count', 'height' and 'file'"),
         (("fills", 0, "material"), "gravel", "unknown material 'gravel'"),
