@@ -6,6 +6,7 @@ import trimesh
 from shapes import THIN, damaged, far_from_surface, grid_around, robot_mesh, solid_angle_inside, wavy_ball
 
 from sampler import SignedDistance, read_mesh, repair_mesh
+from sampler.caps import span_loop
 from sampler.mass import integrate
 from sampler.repair import SHEET
 
@@ -184,3 +185,14 @@ def test_damaged_robot_meshes(name, how):
     grid, near = signs(damaged(mesh, how), mesh)
     assert grid <= 1e-4
     assert near <= 1e-3
+
+
+@pytest.mark.parametrize("tips", [20, 150])
+def test_a_jagged_loop_is_spanned_within_its_edge(tips):
+    # Two triangles per tip of a star, from its middle.
+    angle = np.arange(2 * tips) * np.pi / tips
+    reach = np.where(np.arange(2 * tips) % 2, 1.0, 2.0)
+    star = np.stack([reach * np.cos(angle), reach * np.sin(angle), np.full(2 * tips, 3.0)], axis=1)
+    corners = star[span_loop(star, np.arange(2 * tips))]
+    area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert np.linalg.norm(area, axis=1).sum() == pytest.approx(2 * tips * 0.5 * 2.0 * 1.0 * np.sin(np.pi / tips))
