@@ -11,7 +11,7 @@ from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_m
 from sampler.surface import Surface
 from sand_sim import rotation
 from sand_sim.link_mesh import model_link
-from sand_sim.scene.shapes import shape_named
+from sand_sim.scene.filling import smallest_sphere
 from sand_sim.scene.types import SMOOTH, Scene, SceneError, Tool
 
 Progress = Callable[[str, float], None]
@@ -94,7 +94,7 @@ def model_tool(tool: Tool, scene: Scene, progress: Progress = lambda stage, shar
     try:
         mesh = model_link(tool, scene) if tool.link else read_mesh(locate_mesh(tool.mesh, scene.folder), tool.scale)
         show = partial(progress, f"sampling {tool.name}")
-        grain, spacing = None if tool.contact == SMOOTH else _smallest_grain(scene), tool.particle_spacing
+        grain, spacing = None if tool.contact == SMOOTH else smallest_sphere(scene.fills), tool.particle_spacing
         options = {"grain": grain, "spacing": spacing, "thickness": tool.thickness}
         body = sample_mesh(mesh, tool.particle_radius, progress=show, **options)
     except MeshError as error:
@@ -112,14 +112,3 @@ def outward_triangles(triangles: np.ndarray) -> np.ndarray:
     solid_before, solid_behind = (np.abs(around.winding(centres + side * step)) > 0.5 for side in (1.0, -1.0))
     turned = np.where((solid_before & ~solid_behind)[:, None, None], triangles[:, ::-1], triangles)
     return np.concatenate([turned, triangles[~solid_before & ~solid_behind][:, ::-1]])
-
-
-def _smallest_grain(scene: Scene) -> float | None:
-    """Smallest radius of a sphere that the fills can draw, none of which may pass between a tool's particles [m]."""
-    least = []
-    for fill in scene.fills:
-        if fill.size:
-            shape = shape_named(fill.shape, f"fills: '{fill.name}'")
-            share = float(shape.radii.min()) / shape.equal_radius if shape else 1.0
-            least.append(share * (min(fill.size.radii) if fill.size.radii else fill.size.low or fill.size.mean))
-    return min(least, default=None)

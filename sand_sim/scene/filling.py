@@ -42,7 +42,9 @@ def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -
     """
     shape = shape_named(fill.shape, f"fills: '{fill.name}'")
     if fill.file is not None:
-        return _read_positions(fill, shape, material, index)
+        columns = _read_file(fill)
+        placed = [columns.pop(name) for name in ("position", "radius", "orientation")]
+        return _table(*placed[:2], fill, material, index, shape, placed[2], **columns)
     random = np.random.default_rng(fill.seed)
     largest = _largest(fill.size) * (shape.bounding_radius / shape.equal_radius if shape else 1.0)
     points = _lattice(fill, largest, random)
@@ -57,6 +59,23 @@ def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -
     radius = _draw(fill.size, wanted, random)
     turns = rotation.at_random(wanted, random) if shape else None
     return _table(points[:wanted], radius, fill, material, index, shape, turns)
+
+
+def smallest_sphere(fills: Iterable[Fill]) -> float | None:
+    """Radius of the smallest sphere, a grain or part of one, that fills can put into a scene [m]; None without fills.
+
+    Raises:
+        SceneError: if a file is unreadable.
+    """
+    return min(map(_smallest, fills), default=None)
+
+
+def _smallest(fill: Fill) -> float:
+    shape = shape_named(fill.shape, f"fills: '{fill.name}'")
+    share = float(shape.radii.min()) / shape.equal_radius if shape else 1.0
+    if fill.file is not None:
+        return share * float(_read_file(fill)["radius"].min())
+    return share * (min(fill.size.radii) if fill.size.radii else fill.size.low or fill.size.mean)
 
 
 def _clear(solid, points: np.ndarray, gap: float) -> np.ndarray:
@@ -142,8 +161,8 @@ def _table(position, radius, fill: Fill, material: Material, index: int, shape: 
     return GrainTable.of_spheres(position, velocity, spin, radius, density, kind)
 
 
-def _read_positions(fill: Fill, shape: Shape | None, material: Material, index: int) -> GrainTable:
-    """Grains from a file, of which only position and radius must be there, see ``_COLUMNS``."""
+def _read_file(fill: Fill) -> dict[str, np.ndarray]:
+    """What a file tells of grains, of which only position and radius must be there, see ``_COLUMNS``."""
     path = Path(fill.file)
     where = f"fills: file '{path.name}' of '{fill.name}'"
     try:
@@ -155,25 +174,25 @@ def _read_positions(fill: Fill, shape: Shape | None, material: Material, index: 
     for name in ("position", "radius"):
         if name not in columns:
             raise SceneError(f"{where} has no '{name}'; it has {', '.join(columns) or 'nothing'}")
-    position, radius = columns.pop("position"), columns.pop("radius")
+    position, radius = columns["position"], columns["radius"]
     if position.ndim != 2 or position.shape[1] != 3 or not len(position):
         raise SceneError(f"{where}: 'position' must have shape (n, 3) with n > 0, got {position.shape}")
     number = len(position)
     if radius.shape != (number,):
         raise SceneError(f"{where}: 'radius' must have shape ({number},), got {radius.shape}")
     for name, values in columns.items():
-        if values.shape != (number, width := len(_COLUMNS[name])):
+        if name != "radius" and values.shape != (number, width := len(_COLUMNS[name])):
             raise SceneError(f"{where}: '{name}' must have shape ({number}, {width}), got {values.shape}")
-    for name, values in (("position", position), ("radius", radius), *columns.items()):
+    for name, values in columns.items():
         if not np.all(np.isfinite(values)):
             raise SceneError(f"{where}: '{name}' has values that are not finite")
     if np.any(radius <= 0.0):
         raise SceneError(f"{where}: 'radius' must be positive [m], the smallest is {radius.min():g}")
-    turns = columns.pop("orientation", np.tile([0.0, 0.0, 0.0, 1.0], (number, 1)))
+    turns = columns.setdefault("orientation", np.tile([0.0, 0.0, 0.0, 1.0], (number, 1)))
     lengths = np.linalg.norm(turns, axis=1)
     if np.any(lengths < 1e-6):
         raise SceneError(f"{where}: 'orientation' must not be the zero quaternion; 0, 0, 0, 1 is no rotation")
-    return _table(position, radius, fill, material, index, shape, turns / lengths[:, None], **columns)
+    return columns | {"orientation": turns / lengths[:, None]}
 
 
 def _read_arrays(path: Path) -> dict[str, np.ndarray]:
