@@ -116,12 +116,9 @@ class Gaps:
         nearest = self.neighbour_distances()
         self._seek(random)
         places, free, excess = self.places, self.places.closest["way"], self.places.excess
-        for i in np.flatnonzero(nearest > _LONELY):
-            away = np.linalg.norm(places.points - self.points[i], axis=1) / self.spacing
-            beside = np.flatnonzero((away > _BESIDE[0]) & (away < _BESIDE[1]))
-            if len(beside):
-                k = beside[free[beside].argmax()]
-                excess[k] = max(excess[k], _WEIGHT * (nearest[i] - _LONELY))
+        for i, beside in self._places_beside(np.flatnonzero(nearest > _LONELY)):
+            k = beside[free[beside].argmax()]
+            excess[k] = max(excess[k], _WEIGHT * (nearest[i] - _LONELY))
         crowded = np.flatnonzero(nearest < _LEAST)
         crowded = crowded[np.lexsort((nearest[crowded], pinned[crowded]))]
         gaps = self._worst(excess, len(crowded))
@@ -160,6 +157,20 @@ class Gaps:
             known = places.points, places.normals, found
             worst = climb(*known, beside, lambda *at, k=along: self.measure(*at)[k]["way"], _STEPS, self.spacing)
             self.add(*worst[:2])
+
+    def _places_beside(self, which: np.ndarray):
+        """Yield each of some particles and the numbers of the places beside it, if there are any."""
+        points = self.places.points
+        axis = int(np.ptp(self.skin.triangles, axis=(0, 1)).argmax())
+        order = np.argsort(points[:, axis], kind="stable") if len(which) else which
+        here, reach = self.points[which, axis], _BESIDE[1] * self.spacing
+        first, last = (np.searchsorted(points[order, axis], x) for x in (here - reach, here + reach))
+        for i, begin, end in zip(which, first, last, strict=True):
+            near = np.sort(order[begin:end])
+            away = np.linalg.norm(points[near] - self.points[i], axis=1) / self.spacing
+            beside = near[(away > _BESIDE[0]) & (away < _BESIDE[1])]
+            if len(beside):
+                yield i, beside
 
     def _missed(self) -> np.ndarray:
         """How far in a gap the worst place would be without each particle."""
