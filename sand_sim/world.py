@@ -178,15 +178,13 @@ class World(Changeable):
         if self._measured and self._measured[0] == self._solver.steps_done:
             self._keep()
         every = max(self.frame_steps, _FEWEST_BETWEEN)
-        while steps > 0:
-            part = min(steps, every)
+        for done in range(0, steps, every):
             try:
-                self._solver.run(part)
+                self._solver.run(min(every, steps - done))
             except UnstableError as error:
                 raise self._go_back(str(error)) from None
             if self._solver.steps_done >= self._kept_steps + every:
                 self._keep()
-            steps -= part
 
     def observe(self) -> Observation:
         """What the world shows now; forces on tools are means since the last observation."""

@@ -30,3 +30,9 @@ def test_reports_that_are_not_there_are_told(world, kind, known):
 def test_poses_of_another_shape_are_refused(world, position, orientation, told):
     with pytest.raises(CommandError, match=told):
         world.apply(ToolPose("plate", np.array(position), np.array(orientation)))
+
+
+def test_a_part_of_a_step_is_refused(world):
+    with pytest.raises(TypeError, match="'float' object cannot be interpreted as an integer"):
+        world.step(2.5)
+    assert world.steps == 0

@@ -105,6 +105,8 @@ def read_scene(parsed: dict, folder: Path) -> Scene:
         ),
         required=("materials", "pairs"),
     )
+    tools = tuple(_tool(name, entry) for name, entry in top["tools"].items()) if "tools" in top else ()
+    last = max((waypoint.time for tool in tools for waypoint in tool.trajectory), default=0.0)
     scene = Scene(
         name=top.optional("name", _file_name, "scene"),
         gravity=top.optional("gravity", Field.vector, (0.0, 0.0, -9.81)),
@@ -113,13 +115,13 @@ def read_scene(parsed: dict, folder: Path) -> Scene:
         pairs=tuple(_pair(entry) for entry in top["pairs"].entries()),
         fills=tuple(_fill(entry, folder) for entry in top["fills"].entries()) if "fills" in top else (),
         boundaries=tuple(read_boundary(entry, folder) for entry in top["boundaries"].entries()) if "boundaries" in top else (),
-        tools=tuple(_tool(name, entry) for name, entry in top["tools"].items()) if "tools" in top else (),
+        tools=tools,
         bodies=tuple(read_body(name, entry, folder) for name, entry in top["bodies"].items()) if "bodies" in top else (),
         contact=top.optional("contact", _contact, ContactModel()),
         liquid=top.optional("liquid", _liquid, None),
         solver=top.optional("solver", _solver, Solver()),
         settle=top.optional("settle", _settle, Settle()),
-        duration=top.optional("duration", lambda f: f.number(above=0.0, unit="s"), 1.0),
+        duration=top.optional("duration", lambda f: f.number(above=0.0, unit="s"), last or 1.0),
         frame_rate=top.optional("frame_rate", lambda f: f.number(above=0.0, most=1e6, unit="1/s"), 50.0),
         folder=folder,
     )

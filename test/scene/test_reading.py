@@ -138,6 +138,12 @@ def test_orientation_may_be_given_as_roll_pitch_yaw():
     assert scene.tool("spade").pose.orientation == pytest.approx((0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)))
 
 
+@pytest.mark.parametrize(("times", "lasts"), [((0.0, 4.0), 4.0), ((0.0,), 1.0)])
+def test_a_scene_lasts_to_the_last_waypoint(times, lasts):
+    trajectory = [{"time": time, "position": [0.0, 0.0, time]} for time in times]
+    assert read_scene(changed(("tools", "spade", "trajectory"), trajectory), Path.cwd()).duration == lasts
+
+
 @pytest.mark.parametrize("path", sorted(config_folder().glob("*.yaml")), ids=lambda path: path.stem)
 def test_own_scenes_are_good(path):
     assert load_scene(path).name == yaml.safe_load(path.read_text())["name"]
