@@ -107,7 +107,8 @@ def sample_body(
 
     area = float(skin.areas.sum())
     points, normals, evenness, wanted = _spread_tight(spread, skin, radius, fine, count, grain)
-    uneven = broken_limits(evenness, len(points), wanted, radius, solid.unit if solid else skin.unit)
+    size = float(np.linalg.norm(np.ptp(repaired.triangles, axis=(0, 1))))  # of sheets, too
+    uneven = broken_limits(evenness, len(points), wanted, radius, size)
     return ParticleBody(
         points=points,
         normals=normals,

@@ -380,3 +380,10 @@ def test_a_sheet_beside_a_solid_weighs_what_its_thickness_says():
     assert body.volume == pytest.approx(1e-3 + 0.02 * 0.002, rel=1e-12)
     assert body.centre == pytest.approx([0.15 * 0.02 * 0.002 / body.volume, 0.0, 0.0], abs=1e-12)
     assert body.steps["sheets"] == 1
+
+
+def test_particles_are_not_called_large_because_the_only_solid_among_sheets_is_small():
+    sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    screw = trimesh.creation.box((0.02, 0.02, 0.02), transform=trimesh.transformations.translation_matrix([0.5, 0.5, 0.3]))
+    body = sample_body(trimesh.util.concatenate([sheet, screw]), radius=0.03)
+    assert not [warning for warning in body.warnings if "as large as the mesh" in warning]
