@@ -53,7 +53,19 @@ def test_sizes_follow_their_distribution(size, low, high, mean):
 def test_grains_keep_clear_of_walls():
     cylinder = Wall("cylinder", "pipe", "steel", np.array([0.1, 0.05, 0.0]), np.array([0.0, 0.0, 1.0]), 0.045)
     table = fill_grains(fill(count=100), SAND, 0, [cylinder])
-    assert np.all(cylinder.distance(table.position) >= 0.005)
+    assert np.all(cylinder.distance(table.position) >= 0.005 * (1.0 - 1e-6))
+
+
+@pytest.mark.parametrize("away", [0.0, 1e4])
+def test_no_place_is_lost_where_the_region_ends_at_walls(away):
+    """Ten places on each side, 1.06 diameters apart, of which jitter moves every other one towards a wall."""
+    low, side = np.full(3, away), 0.01 + 9.0 * 0.0106
+    faces = [(low, 1.0), (low + side, -1.0)]
+    walls = [Wall("plane", "face", "steel", point, sign * axis) for point, sign in faces for axis in np.eye(3)]
+    table = fill_grains(fill(count=1000, low=tuple(low), high=tuple(low + side + 1e-9)), SAND, 0, walls)
+    distance = np.min([wall.distance(table.position) for wall in walls], axis=0)
+    assert len(table) == 1000
+    assert distance.min() == pytest.approx(0.005, rel=1e-6)
 
 
 @pytest.mark.parametrize("radius", [1e-6, 1e-29])
