@@ -15,8 +15,6 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         0; 1 where the mesh or an option cannot be used; 130 where the user stopped it.
     """
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # imports pass an exception on as anything, or swallow it
-    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # as usual where nobody reads on, as in ``| head``
     options = _parser().parse_args(arguments)
     try:
         return _run(options)
@@ -120,4 +118,6 @@ class _Bar:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # imports pass an exception on as anything, or swallow it
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # as usual where nobody reads on, as in ``| head``
     sys.exit(main())
