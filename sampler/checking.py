@@ -25,6 +25,8 @@ def check_file(path: Path) -> None:
         raise MeshError(f"mesh {path.name}: is a Git LFS pointer, not a mesh; run 'git lfs pull' where it comes from")
     if not data.strip(b"\0 \r\n\t"):
         raise MeshError(f"mesh {path.name}: is empty")
+    if not path.suffix:
+        raise MeshError(f"mesh {path.name}: has no ending that tells its format, as .stl or .obj; rename it")
     check = {".stl": _check_stl, ".obj": _check_obj, ".glb": _check_glb}
     check.get(path.suffix.lower(), lambda name, data: None)(path.name, data)
 
@@ -56,12 +58,16 @@ def _check_stl(name: str, data: bytes) -> None:
     promised, held = _stl_triangles(data)
     if promised > held:
         raise MeshError(f"mesh {name}: is cut off: it promises {promised} triangles and holds {held}; copy or export it again")
+    if promised < held and (len(data) - _STL_HEADER) % _STL_TRIANGLE == 0:
+        raise MeshError(f"mesh {name}: is damaged: it promises {promised} triangles and holds {held}; export it again")
     if promised == 0:
         raise MeshError(f"mesh {name}: has no triangles")
 
 
 def _check_obj(name: str, data: bytes) -> None:
     """Readers drop faces they do not understand; a body with faces dropped would be wrong in silence."""
+    if b"\0" in data:
+        raise MeshError(f"mesh {name}: is no OBJ file but binary; give it the ending of its format, as .stl")
     data = plain_obj(data)
     vertices = data.count(b"\nv ")
     for match in re.finditer(rb"\nf ([^\r\n]*)", data):

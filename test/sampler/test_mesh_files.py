@@ -164,6 +164,23 @@ def test_stl_with_bytes_to_spare_is_read(tmp_path, box):
     assert read_mesh(path).volume == pytest.approx(box.volume, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("name", "told"), [("box.obj", "is no OBJ file but binary"), ("box", "has no ending that tells its format")]
+)
+def test_wrong_endings_are_told(tmp_path, box, name, told):
+    (tmp_path / name).write_bytes(box.export(file_type="stl"))
+    with pytest.raises(MeshError, match=f"mesh {name}: {told}"):
+        read_mesh(tmp_path / name)
+
+
+@pytest.mark.parametrize("promised", [0, 7])
+def test_binary_stl_of_more_triangles_than_it_promises_is_refused(tmp_path, box, promised):
+    data = box.export(file_type="stl")
+    (tmp_path / "more.stl").write_bytes(data[:80] + struct.pack("<I", promised) + data[84:])
+    with pytest.raises(MeshError, match=rf"more\.stl: is damaged: it promises {promised} triangles and holds 12"):
+        read_mesh(tmp_path / "more.stl")
+
+
 def stl_of(triangles):
     rows = b"".join(struct.pack("<12fH", 0, 0, 0, *np.ravel(t), 0) for t in triangles)
     return b"\0" * 80 + struct.pack("<I", len(triangles)) + rows
