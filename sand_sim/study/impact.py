@@ -53,7 +53,9 @@ class Impact:
         if scene.contact.normal != "hertz" or scene.contact.cohesion != "none":
             return None
         if any(scene.gravity):
-            raise SceneError("gravity: the closed form of an impact is that without gravity; use [0, 0, 0]")
+            raise SceneError(
+                "gravity: the closed form of an impact is that without gravity; use [0, 0, 0], or another --quantity"
+            )
         world = World(scene)
         radius, mass, young, restitution = _bodies(world)
         speed = _approach(world)[1]

@@ -146,7 +146,10 @@ def test_own_scenes_can_be_read(name):
         (["nothing"], "sand_sim: scene 'nothing': there is no such file"),
         (["dig", "--set", "solver.time_step=abc"], "sand_sim: solver.time_step: must be a number"),
         (["dig", "--set", "materials.young.more=1"], "sand_sim: "),
-        (["dig", "--quantity", "impact"], "sand_sim: gravity: "),
+        (
+            ["dig", "--quantity", "impact"],
+            "sand_sim: gravity: the closed form of an impact is that without gravity; use [0, 0, 0], or another --quantity",
+        ),
     ],
 )
 def test_refusals_are_one_line(capsys, tmp_path, words, message):
