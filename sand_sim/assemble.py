@@ -17,7 +17,7 @@ from sand_sim.engine.tool_body import ToolBody
 from sand_sim.grain_table import GrainTable
 from sand_sim.precision import PRECISIONS, Precision
 from sand_sim.scene.checking import check_scene
-from sand_sim.scene.filling import fill_grains
+from sand_sim.scene.filling import fill_grains, smallest_sphere
 from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.stable_step import DEEP
 from sand_sim.scene.time_step import TimeStep, choose_time_step, fastest_speed
@@ -49,6 +49,7 @@ class Assembly:
         bodies: in the order of the scene.
         grounds: terrains, which the solver has as bodies after the tools.
         smallest: smallest grain radius of each grain material [m].
+        finest: smallest sphere that the fills can bring, none of which passes tools or gets into bodies [m]; None without any.
         time_step: chosen, with its reasons.
         frame_steps: steps per frame.
         lattice: the domain.
@@ -67,6 +68,7 @@ class Assembly:
     bodies: list[BodyModel]
     grounds: list[Ground]
     smallest: dict[str, float]
+    finest: float | None
     time_step: TimeStep
     frame_steps: int
     lattice: Lattice
@@ -117,7 +119,8 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         SceneError: if parts do not fit together, or a mesh, a fill or the time step cannot be used; the message names the field.
     """
     check_scene(scene)  # again: ``dataclasses.replace`` may have changed it since it was read
-    tools = [model_tool(tool, scene, progress) for tool in scene.tools]
+    finest = smallest_sphere(scene.fills) if scene.tools or scene.bodies else None
+    tools = [model_tool(tool, scene, finest, progress) for tool in scene.tools]
     grounds = [
         model_ground(one, scene.folder, lambda share, name=one.name: progress(f"sampling {name}", share))
         for one in scene.boundaries
@@ -125,7 +128,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     ]
     walls = [wall for boundary in scene.boundaries for wall in walls_of(boundary)]
     order = material_order(scene)
-    bodies = [model_body(body, scene, progress) for body in scene.bodies]
+    bodies = [model_body(body, scene, finest, progress) for body in scene.bodies]
     solids = [*walls, *tools, *grounds, *bodies]
     fills = [
         fill_grains(fill, scene.materials[scene.material_index(fill.material)], order.index(fill.material), solids)
@@ -161,6 +164,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         bodies,
         grounds,
         smallest,
+        finest,
         time_step,
         frame_steps,
         lattice,

@@ -11,7 +11,6 @@ from sampler import MeshError, SignedDistance, locate_mesh, read_mesh, sample_fi
 from sand_sim import rotation
 from sand_sim.grain_table import BodyTable, GrainTable
 from sand_sim.scene.clumps import members_of
-from sand_sim.scene.filling import smallest_sphere
 from sand_sim.scene.shapes import Shape, principal_shape, read_shape, shape_of_spheres
 from sand_sim.scene.types import Body, Scene, SceneError
 
@@ -67,12 +66,13 @@ class BodyModel:
         return position - axes @ self.shape.middle, rotation.from_matrix(axes)
 
 
-def model_body(body: Body, scene: Scene, progress) -> BodyModel:
-    """Sample a body's mesh, so finely that no grain of the fills gets in, or take its spheres, and find its mass properties.
+def model_body(body: Body, scene: Scene, grain: float | None, progress) -> BodyModel:
+    """Sample a body's mesh, so finely that no grain gets in, or take its spheres, and find its mass properties.
 
     Args:
         body: of the scene.
         scene: for density and paths.
+        grain: radius of the smallest one [m], None without any.
         progress: as ``assemble``'s.
 
     Raises:
@@ -84,8 +84,8 @@ def model_body(body: Body, scene: Scene, progress) -> BodyModel:
         try:
             path, show = locate_mesh(body.mesh, scene.folder), partial(progress, f"sampling {body.name}")
             mesh = read_mesh(path, body.scale)
-            options = {"grain": smallest_sphere(scene.fills), "thickness": body.thickness}
-            skin = sample_file(path, body.particle_radius, body.scale, progress=show, **options)
+            options = {"grain": grain, "thickness": body.thickness, "progress": show}
+            skin = sample_file(path, body.particle_radius, body.scale, **options)
         except MeshError as error:
             raise SceneError(f"{where}.mesh: {error}") from None
         if not np.isfinite(skin.volume) and body.inertia is None:

@@ -120,7 +120,7 @@ def fit(assembly: Assembly, loaded: Assembly, models: dict, state: dict[str, np.
         if path and key not in models:
             scene, tool = assembly.scene, tools[index].tool
             file = allowed_mesh(key[1], *mesh_roots(scene.mesh_roots, scene.folder))
-            model = model_tool(with_mesh(tool, str(file), key[2]), scene)
+            model = model_tool(with_mesh(tool, str(file), key[2]), scene, assembly.finest)
             models[key] = replace(model, tool=with_mesh(tool, key[1], key[2]))
         tools[index] = models[key] if path else loaded.tools[index]
     reserve = float(state.get("lattice.reserve", assembly.lattice.reserve))

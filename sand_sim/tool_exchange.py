@@ -32,7 +32,7 @@ def read_tool(assembly: Assembly, tool: Tool, mesh: str, scale: float) -> ToolMo
                 f"tool '{tool.name}': the new mesh reaches {reach:.4g} m from the tool frame's origin, the domain is only "
                 f"{widest:.4g} m wide; scale it down",
             )
-        return model_tool(other, assembly.scene)
+        return model_tool(other, assembly.scene, assembly.finest)
     except MeshError as error:
         raise CommandError("bad_mesh", f"tools.{tool.name}.mesh: {error}") from None
     except SceneError as error:

@@ -11,7 +11,6 @@ from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_m
 from sampler.surface import Surface
 from sand_sim import rotation
 from sand_sim.link_mesh import model_link
-from sand_sim.scene.filling import smallest_sphere
 from sand_sim.scene.types import SMOOTH, Scene, SceneError, Tool
 
 Progress = Callable[[str, float], None]
@@ -80,12 +79,13 @@ def with_mesh(tool: Tool, mesh: str, scale: float) -> Tool:
     return replace(tool, mesh=mesh, scale=float(scale), urdf="", link="")
 
 
-def model_tool(tool: Tool, scene: Scene, progress: Progress = lambda stage, share: None) -> ToolModel:
-    """Sample a tool's mesh, so finely that no grain of the scene's fills passes between the particles it may touch.
+def model_tool(tool: Tool, scene: Scene, grain: float | None, progress: Progress = lambda stage, share: None) -> ToolModel:
+    """Sample a tool's mesh, so finely that no grain of the scene passes between the particles it may touch.
 
     Args:
         tool: of the scene.
-        scene: for paths and grains.
+        scene: for paths.
+        grain: radius of the smallest one [m], None without any.
         progress: called with the name of a stage and the share of it that is done, 0 to 1.
 
     Raises:
@@ -94,8 +94,8 @@ def model_tool(tool: Tool, scene: Scene, progress: Progress = lambda stage, shar
     try:
         mesh = model_link(tool, scene) if tool.link else read_mesh(locate_mesh(tool.mesh, scene.folder), tool.scale)
         show = partial(progress, f"sampling {tool.name}")
-        grain, spacing = None if tool.contact == SMOOTH else smallest_sphere(scene.fills), tool.particle_spacing
-        options = {"grain": grain, "spacing": spacing, "thickness": tool.thickness}
+        grain = None if tool.contact == SMOOTH else grain
+        options = {"grain": grain, "spacing": tool.particle_spacing, "thickness": tool.thickness}
         body = sample_mesh(mesh, tool.particle_radius, progress=show, **options)
     except MeshError as error:
         raise SceneError(f"tools.{tool.name}.{'link' if tool.link else 'mesh'}: {error}") from None

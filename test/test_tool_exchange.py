@@ -35,6 +35,13 @@ def test_same_shape_feels_the_same_grains(tmp_path):
     assert (report.work, report.swept, after.steps) == (was.work, was.swept, before.steps)
 
 
+def test_the_file_of_the_grains_may_have_gone(tmp_path):
+    world = World(load_scene(write_small_scene(tmp_path)))
+    (tmp_path / "bed.npz").unlink()
+    world.set_tool_mesh("plate", box(tmp_path, "wider.stl", (0.08, 0.06, 0.004)))
+    assert np.ptp(world.tools[0].body.points, axis=0) == pytest.approx([0.08, 0.06, 0.004], abs=1e-6)
+
+
 def particles_of(world, tool):
     tools = world.assembly.solver.arrays.tools
     return tools.particles.numpy()[tools.tool_of.numpy() == tool].copy()

@@ -8,6 +8,7 @@ import trimesh
 
 from sand_sim import SceneError
 from sand_sim.body_model import model_body
+from sand_sim.scene.filling import smallest_sphere
 from sand_sim.scene.types import SMOOTH, Body, Fill, SizeDistribution, Tool
 from sand_sim.tool_model import model_tool
 
@@ -29,9 +30,9 @@ def test_no_grain_passes_wherever_it_comes_from(tmp_path, how):
     trimesh.creation.box((0.06, 0.06, 0.02)).export(tmp_path / "plate.stl")
     fill, smallest = grains_of(tmp_path, how)
     scene = SimpleNamespace(folder=tmp_path, fills=(Fill("coarse", "sand", size=SizeDistribution("constant", 0.01)), fill))
-    rough = model_tool(Tool("plate", "plate.stl", "steel", RADIUS), scene).body
+    rough = model_tool(Tool("plate", "plate.stl", "steel", RADIUS), scene, smallest_sphere(scene.fills)).body
     assert rough.coverage < RADIUS + smallest
-    smooth = model_tool(Tool("plate", "plate.stl", "steel", RADIUS, contact=SMOOTH), scene).body
+    smooth = model_tool(Tool("plate", "plate.stl", "steel", RADIUS, contact=SMOOTH), scene, smallest_sphere(scene.fills)).body
     assert smooth.coverage > RADIUS + smallest  # its particles stop no grains
 
 
@@ -39,7 +40,7 @@ def test_a_tool_whose_grains_cannot_be_read_is_refused(tmp_path):
     trimesh.creation.box((0.06, 0.06, 0.02)).export(tmp_path / "plate.stl")
     scene = SimpleNamespace(folder=tmp_path, fills=(Fill("bed", "sand", file=tmp_path / "lost.csv"),))
     with pytest.raises(SceneError, match=r"lost\.csv' of 'bed' cannot be read"):
-        model_tool(Tool("plate", "plate.stl", "steel", RADIUS), scene)
+        model_tool(Tool("plate", "plate.stl", "steel", RADIUS), scene, smallest_sphere(scene.fills))
 
 
 def test_no_grain_gets_into_a_body(tmp_path):
@@ -47,7 +48,7 @@ def test_no_grain_gets_into_a_body(tmp_path):
     fill, smallest = grains_of(tmp_path, "file")
     sand = SimpleNamespace(density=2000.0)
     scene = SimpleNamespace(folder=tmp_path, fills=(fill,), materials=[sand], material_index=lambda name: 0)
-    body = model_body(Body("crate", "sand", "crate.stl", RADIUS), scene, lambda stage, share: None)
+    body = model_body(Body("crate", "sand", "crate.stl", RADIUS), scene, smallest_sphere(scene.fills), lambda stage, share: None)
     places = trimesh.creation.box((0.06, 0.06, 0.02)).sample(3000)
     centres = body.shape.centres @ body.shape.axes.T + body.shape.middle
     farthest = np.linalg.norm(places[:, None] - centres, axis=2).min(axis=1).max()
