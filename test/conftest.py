@@ -1,6 +1,7 @@
 """Scenes for tests, and a ROS domain of their own."""
 
 import os
+import socket
 import sys
 from pathlib import Path
 
@@ -8,9 +9,24 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent / "support"))
 
-# A domain of our own, heard on this machine only, whatever else runs on the network; above 101 its ports are those that
-# Linux gives to anyone. Set before any rclpy import.
-os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
+
+def claim_domain():
+    """A ROS domain that nobody is in, and a socket that keeps other runs of these tests out of it."""
+    for k in range(100):  # above 101 the ports are those that Linux gives to anyone
+        domain = 1 + (os.getpid() + k) % 100
+        claim = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            claim.bind(("", 7410 + 250 * domain))  # where the first participant of a domain listens; others take the next one
+        except OSError:
+            claim.close()
+        else:
+            return domain, claim
+    raise RuntimeError("somebody is in each of the ROS domains 1 to 100")
+
+
+# Heard on this machine only, whatever else runs on the network. Set before any rclpy import.
+DOMAIN, CLAIM = claim_domain()
+os.environ["ROS_DOMAIN_ID"] = str(DOMAIN)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from scenes import SceneMaker

@@ -59,6 +59,7 @@ def start_node(ros, tmp_path):
         node = SandSimNode(parameter_overrides=overrides)
         running.callback(node.destroy_node)
         executor = SingleThreadedExecutor()
+        running.callback(executor.shutdown)  # it holds on to what it waits for
         executor.add_node(node)
         if node.parameters["autostart"]:
             node.start()

@@ -23,7 +23,7 @@ def play(tmp_path):
     started = []
 
     def start(*words):
-        command = [sys.executable, "-m", "sand_sim", "play", tmp_path / "small.yaml", *words]
+        command = [sys.executable, "-X", "faulthandler", "-m", "sand_sim", "play", tmp_path / "small.yaml", *words]
         started.append(subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
         return started[-1]
 
@@ -35,7 +35,11 @@ def play(tmp_path):
 
 
 def finish(process):
-    _, errors = process.communicate(timeout=PATIENCE)
+    try:
+        _, errors = process.communicate(timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGABRT)  # which tells where it hangs
+        pytest.fail(f"it does not end: {process.communicate()[1]}")
     told = [line for line in errors.splitlines(keepends=True) if "waiting for" not in line]  # on a slow machine that comes first
     return process.returncode, "".join(told)
 

@@ -66,6 +66,7 @@ class Client:
         return values.get(key)
 
     def close(self):
+        self.executor.shutdown()  # it holds on to what it waits for
         self.node.destroy_node()
 
 
