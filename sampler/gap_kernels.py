@@ -83,8 +83,11 @@ def find_gaps(
         closest = Nearest(int(-1), most * spacing, spacing)
         own = Nearest(int(-1), most * spacing, spacing)
         for j in wp.hash_grid_query(grid, here, reach):
-            way = wp.length(points[j] - here)
-            if way < wp.max(own.way, own.next):  # the way along the surface is no shorter
+            between = points[j] - here
+            square = wp.dot(between, between)
+            farthest = wp.max(own.way, own.next)
+            if square < farthest * farthest:  # the way along the surface is no shorter
+                way = wp.sqrt(square)
                 closest = nearer(closest, j, way)
                 own = nearer(own, j, way_along(here, place_normals[i], points[j], normals[j], _NARROW * spacing))
         if own.way <= reach:

@@ -20,6 +20,7 @@ _ROOM, _NEAR = 0.55, 0.4  # a gap is filled so far from particles of other skins
 _LEAST, _TOO_NEAR = 0.40, 0.37  # particles nearer than this to one another are a fault, and a grave one, in spacings
 _LONELY, _BESIDE = 1.09, (0.6, 1.06)  # those farther than this from all others get a neighbour, how far beside them; in spacings
 _MOVED, _TURNED = 1e-3, 0.999  # what has moved less, in spacings, and turned less, by the cosine, lies where it was
+_CELL = 2.0  # of the grid that particles are found with, in spacings: most are looked for within one, in 8 cells and not in 27
 FAR = 2.0  # how far particles are looked for, in spacings; farther ones are as bad
 
 
@@ -100,7 +101,7 @@ class Gaps:
             for new, old in ((points, self.points), (normals, self.normals))
         )
         self._where, self._up = self.skin.shift(self.points), self._vectors(self.normals)
-        self.grid.build(self._where, self.spacing / self.skin.unit)
+        self.grid.build(self._where, _CELL * self.spacing / self.skin.unit)
         places = self.places
         stale = _near_cells(places.points, changed, self.spacing) | (places.own["way"] > 1.0)  # farther ones may be anywhere
         places.closest[stale], places.own[stale] = self.measure(places.points[stale], places.normals[stale])
@@ -132,7 +133,7 @@ class Gaps:
 
     def widen(self, most: float) -> None:
         """Sort the particles so that they are found fast as far as ``most``, in spacings."""
-        self.grid.build(self._where, max(1.0, most / FAR) * self.spacing / self.skin.unit)
+        self.grid.build(self._where, max(_CELL, most / FAR) * self.spacing / self.skin.unit)
 
     def neighbour_distances(self, most: float = FAR) -> np.ndarray:
         """Distance of particles from the nearest other one, at most ``most``; in spacings."""
