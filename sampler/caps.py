@@ -16,16 +16,16 @@ def close_holes(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) 
         component: of each face, shape (m,).
 
     Returns:
-        Faces of the caps, oriented as their component, shape (k, 3); component of each, shape (k,); corners of the loop that
-        each helps to close, shape (k,).
+        Faces of the caps, oriented as their component, shape (k, 3); component of each, shape (k,); number of the loop that
+        each helps to close, shape (k,): one of n corners takes n - 2 faces.
     """
-    caps, owners, lengths = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
-    for owner, loop in boundary_loops(faces, component):
+    caps, owners, loops = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    for number, (owner, loop) in enumerate(boundary_loops(faces, component)):
         cap = span_loop(vertices, loop)
         caps.append(cap)
         owners.append(np.full(len(cap), owner))
-        lengths.append(np.full(len(cap), len(loop)))
-    return np.concatenate(caps), np.concatenate(owners), np.concatenate(lengths)
+        loops.append(np.full(len(cap), number))
+    return np.concatenate(caps), np.concatenate(owners), np.concatenate(loops)
 
 
 def boundary_loops(faces: np.ndarray, component: np.ndarray):

@@ -19,6 +19,7 @@ from sampler.welding import sew_edges
 SOLID, CAP, SHEET = 0, 1, 2
 
 _SHEET = 0.10  # a component is a sheet if closing it takes more area than this share of its own
+_TORN, _PLANE = 0.6, 0.95  # holes count so much of that if their caps, as vectors, have less of their area: openings are plane
 _ENCLOSED = 0.9  # share of the area that must have an inside for loose pieces to count as one solid
 _ASKED = 4000  # faces are enough to tell that share
 _FEW = 8  # faces of a component in which a hole of three corners is nothing special
@@ -75,8 +76,8 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
 
     Args:
         mesh: in metres.
-        sheets: ``auto`` takes an open component for a sheet where closing it would take more than a tenth of its area;
-            ``never`` closes all, ``always`` none.
+        sheets: ``auto`` takes an open component for a sheet where closing it would take more than a tenth of its area,
+            or a sixth where its rims lie in no plane and so are torn; ``never`` closes all, ``always`` none.
 
     Raises:
         MeshError: if there are no sound triangles, or they are loose and enclose nothing.
@@ -95,9 +96,9 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
         vertices = _meet(vertices, sewn)
         faces = _drop(sewn[faces], report)
     faces, component, piece, report.steps["faces turned"], clashes = agree_faces(vertices, faces)
-    caps, owner, corners = close_holes(vertices, faces, component)
+    caps, owner, loop = close_holes(vertices, faces, component)
     area = np.bincount(component, Surface.areas_of(vertices[faces]))
-    sheet = _sheets(sheets, component, area, owner, corners, Surface.areas_of(vertices[caps]))
+    sheet = _sheets(sheets, component, area, owner, loop, vertices[caps])
     enclosing = sheets == "auto" and sheet.sum() > 1 and _enclosing(vertices[faces], sheet[component], sheet.sum() > _SCATTERED)
     if not enclosing and sheets != "never":
         _refuse_soup(component, area, sheet)
@@ -111,7 +112,7 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
         report.warnings.append(f"{taken.sum()} open pieces are taken for parts of one cracked surface")
     sheet &= area > _FLAKE * area.sum()
     kind = np.where(sheet[component], SHEET, SOLID)
-    report.steps["holes closed"] = round(float((1.0 / (corners[keep] - 2)).sum()))  # a loop of n corners takes n - 2 faces
+    report.steps["holes closed"] = len(np.unique(loop[keep]))
     report.steps["sheets"] = int(sheet.sum())
     faces = np.concatenate([faces, caps[keep]])
     component = np.concatenate([component, owner[keep]])
@@ -120,8 +121,8 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     asked = np.flatnonzero((kind == SOLID) & ~loose[component])
     if len(asked) and int(piece.max()) >= len(area):
         faces, kind = _mend_pieces(vertices, faces, kind, piece, asked, report)
-    large = Surface.areas_of(vertices[caps[keep & (corners > 3)]]).sum()
-    _warn(report, float(large / area.sum()), int((keep & (corners > 3)).sum()), clashes)
+    large = keep & (np.bincount(loop)[loop] > 1)
+    _warn(report, float(Surface.areas_of(vertices[caps[large]]).sum() / area.sum()), int(large.sum()), clashes)
     return RepairedMesh(vertices, faces, kind, closed, report)
 
 
@@ -201,15 +202,19 @@ def _mend_pieces(vertices, faces, kind, piece, asked, report) -> tuple[np.ndarra
     return faces, kind
 
 
-def _sheets(choice: str, component, area, owner, corners, cap_areas) -> np.ndarray:
+def _sheets(choice: str, component, area, owner, loop, caps) -> np.ndarray:
     """Components that are sheets. A hole of three corners in more than a few faces is a face that was lost."""
     if choice == "never":
         return np.zeros(len(area), bool)
     if choice == "always":
         return np.bincount(owner, minlength=len(area)) > 0
-    lost = (corners == 3) & (np.bincount(component)[owner] > _FEW)
-    cap_area = np.bincount(owner[~lost], cap_areas[~lost], minlength=len(area))
-    return cap_area > _SHEET * area
+    across = 0.5 * np.cross(caps[:, 1] - caps[:, 0], caps[:, 2] - caps[:, 0])
+    cap_area = np.linalg.norm(across, axis=1)
+    straight = np.linalg.norm([np.bincount(loop, x) for x in across.T], axis=0)
+    torn = straight < _PLANE * np.bincount(loop, cap_area)
+    lost = (np.bincount(loop) == 1)[loop] & (np.bincount(component)[owner] > _FEW)
+    counted = np.where(lost, 0.0, np.where(torn[loop], _TORN, 1.0)) * cap_area
+    return np.bincount(owner, counted, minlength=len(area)) > _SHEET * area
 
 
 def _enclosing(triangles: np.ndarray, open_: np.ndarray, lenient: bool) -> bool:

@@ -43,6 +43,16 @@ def test_a_hole_costs_little_and_is_told():
     assert any("holes were closed" in warning for warning in repair_mesh(broken).report.warnings)
 
 
+def test_a_torn_hole_may_be_larger_than_an_opening():
+    ring, tube = trimesh.creation.torus(1.0, 0.4, major_sections=96, minor_sections=48), trimesh.creation.cylinder(1.0, 3.6)
+    x, y, z = np.asarray(ring.triangles).mean(axis=1).T
+    torn = (z > 0.1) & (np.abs(np.arctan2(y, x)) < 0.95)
+    opening = np.asarray(tube.triangles)[:, :, 2].min(axis=1) > 1.7
+    for sound, gone, sheets in ((ring, torn, 0), (tube, opening, 1)):
+        assert 0.1 < sound.area_faces[gone].sum() / sound.area < 0.13
+        assert repair_mesh(loose(np.asarray(sound.triangles)[~gone])).report.steps["sheets"] == sheets
+
+
 @pytest.mark.parametrize(("how", "volume", "centre", "inertia"), [("missing", 0.015, 0.003, 0.01), ("hole", 0.06, 0.015, 0.08)])
 @pytest.mark.parametrize("seed", range(3))
 def test_mass_of_broken_meshes(how, volume, centre, inertia, seed):
