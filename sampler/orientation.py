@@ -142,9 +142,9 @@ def inward_pieces(triangles: np.ndarray, piece: np.ndarray, around: Surface) -> 
 
 
 def outside_on_both_sides(triangles: np.ndarray, around: Surface) -> np.ndarray:
-    """Triangles, shape (n, 3, 3) [m], without an inside on any side, shape (n,) bool."""
+    """Triangles, shape (n, 3, 3) [m], without an inside on any side, shape (n,) bool; those of no area have no sides."""
     before, behind = _sides(triangles, around)
-    return (np.abs(before) < 0.5) & (np.abs(behind) < 0.5)
+    return (np.abs(before) < 0.5) & (np.abs(behind) < 0.5) & (Surface.areas_of(triangles) > 0.0)
 
 
 def _sides(triangles: np.ndarray, around: Surface) -> tuple[np.ndarray, np.ndarray]:

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from shapes import THIN, damaged, far_from_surface, grid_around, robot_mesh, solid_angle_inside, wavy_ball
 
-from sampler import SignedDistance, read_mesh, repair_mesh
+from sampler import SignedDistance, read_mesh, repair_mesh, sample_body
 from sampler.caps import span_loop
 from sampler.mass import integrate
 from sampler.repair import SHEET
@@ -155,6 +155,22 @@ def test_a_partition_that_shares_its_edges_with_the_shell_is_told_from_it(turned
     assert (repaired.kind == SHEET).sum() == 2
     assert repaired.report.steps["faces turned"] == repaired.report.steps["holes closed"] == 0
     assert signs(loose(np.concatenate([shell, wall])), loose(shell)) == [0.0, 0.0]
+
+
+def test_slivers_without_area_are_no_sheets():
+    first, second = trimesh.creation.box((1, 1, 1)), trimesh.creation.box((1, 1, 1))
+    second.apply_translation((1, 0, 0))
+    second.update_faces(second.triangles_center[:, 0] > 0.51)  # one wall between the two, whose edges have three faces
+    mesh = trimesh.util.concatenate([first, second])
+    mesh.merge_vertices()
+    p, q = (int(np.argmin(np.linalg.norm(mesh.vertices - [-0.5, -0.5, z], axis=1))) for z in (-0.5, 0.5))
+    cut = next(k for k, face in enumerate(mesh.faces) if {p, q} <= set(face))
+    x, y, z = next(turn for turn in (np.roll(mesh.faces[cut], k) for k in range(3)) if {turn[0], turn[1]} == {p, q})
+    middle = len(mesh.vertices)
+    faces = np.vstack([np.delete(mesh.faces, cut, axis=0), [[x, middle, z], [middle, y, z], [x, y, middle]]])
+    body = sample_body(trimesh.Trimesh([*mesh.vertices, [-0.5, -0.5, 0.1]], faces, process=False), 0.05, sheets="never")
+    assert body.steps["faces of double walls"] == 0
+    assert body.volume == pytest.approx(2.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("size", [1e-4, 1.0, 1e4])
