@@ -40,7 +40,7 @@ def sample_file(path: str | Path, radius: float, scale: float = 1.0, *, cache: b
         MeshError: as ``read_mesh`` and ``sample_body`` do.
     """
     path = Path(path)
-    if path.suffix.lower() == ".gltf":  # its triangles are kept in other files
+    if path.suffix.lower() in (".gltf", ".glb"):  # its triangles may be kept in other files
         return sample_mesh(read_mesh(path, scale), radius, cache=cache, **options)
     content = path.suffix.lower().encode() + path.read_bytes() if cache and path.is_file() else None
     return _keep(content, lambda: read_mesh(path, scale), {"radius": radius, "scale": scale} | options)

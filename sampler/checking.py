@@ -70,7 +70,7 @@ def _check_obj(name: str, data: bytes) -> None:
         raise MeshError(f"mesh {name}: is no OBJ file but binary; give it the ending of its format, as .stl")
     data = plain_obj(data)
     vertices = data.count(b"\nv ")
-    for match in re.finditer(rb"\nf ([^\r\n]*)", data):
+    for match in re.finditer(rb"\nf(?![^ \r\n])([^\r\n]*)", data):
         corners = match.group(1).split()
         try:
             indices = [int(corner.split(b"/")[0]) for corner in corners]

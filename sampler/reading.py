@@ -2,6 +2,7 @@
 
 import io
 import logging
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -10,16 +11,20 @@ import trimesh
 from sampler.checking import check_file, is_text_stl
 from sampler.dae import plain_dae
 from sampler.errors import MeshError
+from sampler.gltf import read_gltf
 from sampler.obj import plain_obj
 from sampler.off import read_off
 from sampler.options import is_positive
 from sampler.ply import read_ply
 from sampler.polygons import check_corners
+from sampler.threemf import read_3mf
 
 # What trimesh says of damage, with a traceback, of normals that nobody looks at too; what matters is told in one line here.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
-_WITH_UNIT = (".dae", ".zae", ".3mf")  # files that state their unit
+_OWN = {".ply": read_ply, ".off": read_off, ".3mf": read_3mf}
+_LETTERS = bytes(range(128)) + 128 * b"?"
+_WITH_UNIT = ("dae", "zae")  # files whose unit trimesh tells
 
 
 def read_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
@@ -28,7 +33,7 @@ def read_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
     Units of DAE and 3MF files and node transforms are applied; the up axis of a DAE file is not, as in RViz.
 
     Args:
-        path: STL, OBJ, PLY (also of triangle strips), DAE or whatever else trimesh reads.
+        path: STL, OBJ, PLY (also of triangle strips), OFF, DAE, glTF, 3MF or whatever else trimesh reads.
         scale: metres per unit of the file; per metre where the file states its unit.
 
     Raises:
@@ -45,6 +50,10 @@ def read_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
         raise
     except ModuleNotFoundError as error:
         raise MeshError(f"mesh {path.name}: is damaged, or needs what is not installed: {error}") from None
+    except NotImplementedError:
+        raise MeshError(
+            f"mesh {path.name}: {path.suffix} files are not read; export it as STL, OBJ, PLY, DAE, glTF or 3MF"
+        ) from None
     except Exception as error:  # trimesh raises whatever its many parsers raise
         raise MeshError(f"mesh {path.name}: cannot be read as {path.suffix or 'a mesh'}: {error}") from None
     mesh.vertices = mesh.vertices * scale
@@ -72,11 +81,14 @@ def check_mesh(mesh: trimesh.Trimesh, name: str = "mesh") -> trimesh.Trimesh:
 
 def _load(path: Path) -> trimesh.Trimesh:
     """Everything that trimesh finds in a file, in one mesh, in metres where the file says what its unit is."""
-    if own := {".ply": read_ply, ".off": read_off}.get(path.suffix.lower()):
-        return own(path.name, path.read_bytes())
-    if path.suffix.lower() == ".stl" and not is_text_stl(data := path.read_bytes()):
+    kind, data = path.suffix[1:].lower(), path.read_bytes()
+    if own := _OWN.get(path.suffix.lower()):
+        return own(path.name, data)
+    if kind in ("gltf", "glb"):
+        return read_gltf(path, data)
+    if kind == "stl" and not is_text_stl(data):
         return _read_stl(data)
-    scene = _load_scene(path)
+    scene = _load_scene(path, kind, data)
     shapes = list(scene.geometry.values())
     if shapes and not any(isinstance(shape, trimesh.Trimesh) for shape in shapes):
         raise MeshError(f"mesh {path.name}: holds points or lines only, no triangles")
@@ -87,20 +99,28 @@ def _load(path: Path) -> trimesh.Trimesh:
     if mesh is None or not len(mesh.faces):
         raise MeshError(f"mesh {path.name}: has no triangles")
     unit = shapes[0].metadata.get("units")
-    if path.suffix.lower() in _WITH_UNIT and unit:
+    if kind in _WITH_UNIT and unit:
         mesh.apply_scale(trimesh.units.unit_conversion(unit, "meters"))
     return mesh
 
 
-def _load_scene(path: Path) -> trimesh.Scene:
+def _load_scene(path: Path, kind: str, data: bytes) -> trimesh.Scene:
     """What trimesh finds in a file, which is made plain for it where it would leave something out."""
-    kind = path.suffix[1:].lower()
-    if kind == "obj":
-        return trimesh.load_scene(io.BytesIO(plain_obj(path.read_bytes())), file_type=kind, process=False)
+    if kind == "zae":
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            kind, data = "dae", archive.read(next(part for part in archive.namelist() if part.lower().endswith(".dae")))
     if kind == "dae":
-        data = plain_dae(path.name, path.read_bytes())
+        data = plain_dae(path.name, data)
         return trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False, ignore_broken=False)
+    if kind in ("obj", "stl"):
+        data = plain_obj(data) if kind == "obj" else data
+        return trimesh.load_scene(io.BytesIO(_plain_letters(data)), file_type=kind, process=False)
     return trimesh.load_scene(path, process=False)
+
+
+def _plain_letters(data: bytes) -> bytes:
+    """Text with other letters, as in names, replaced: nobody knows in which encoding they are."""
+    return data if data.isascii() else data.translate(_LETTERS)
 
 
 def _read_stl(data: bytes) -> trimesh.Trimesh:

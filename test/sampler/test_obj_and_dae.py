@@ -79,6 +79,12 @@ def test_vertices_without_three_coordinates_are_refused(tmp_path, old):
         read_mesh(tmp_path / "flat.obj", scale=0.5)
 
 
+def test_a_face_of_obj_without_corners_is_refused(tmp_path):
+    (tmp_path / "bare.obj").write_text(obj_cube().replace("f 1 2 4 3\n", "f\n"))
+    with pytest.raises(MeshError, match="the face 'f' has too few corners"):
+        read_mesh(tmp_path / "bare.obj")
+
+
 def test_a_face_of_obj_that_is_not_of_numbers_is_refused(tmp_path):
     (tmp_path / "float.obj").write_text(obj_cube().replace("f 1 2", "f 1.0 2"))
     with pytest.raises(MeshError, match=r"'f 1\.0 2 4 3' refers to a vertex that is not among the 8"):
