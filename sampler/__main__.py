@@ -78,8 +78,12 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser("python -m sampler", description="Turn a triangle mesh into a rigid body of even particles.")
-    parser.add_argument("mesh", help="path, file:// or package:// address of an STL, OBJ, PLY, DAE, glTF ... file")
+    parser = argparse.ArgumentParser(
+        "python -m sampler",
+        description="Turn a triangle mesh into a rigid body of even particles.",
+        epilog="example: python -m sampler bucket.stl --scale 0.001 --radius 0.004 --grain 0.001 --density 7800 -o bucket.npz",
+    )
+    parser.add_argument("mesh", help="path, file:// or package:// address of an STL, OBJ, PLY, OFF, DAE, glTF, 3MF ... file")
     parser.add_argument("--radius", type=float, required=True, metavar="R", help="of every particle [m]")
     parser.add_argument("--count", type=int, metavar="N", help="number of particles, instead of a spacing")
     parser.add_argument("--spacing", type=float, metavar="H", help="distance between neighbours [m] (default: 1.5 radii)")

@@ -62,9 +62,11 @@ def broken_limits(evenness: Evenness, number: int, wanted: int, radius: float, s
         found.append(f"particles of radius {radius:.3g} m are about as large as the mesh, {size:.3g} m across; check its scale")
     if np.abs(number - wanted) > max(1.0, _OFF * wanted):
         found.append(f"there are {number} particles where {wanted} were wanted")
-    broken = [(name, "at most", limit) for name, limit in _MOST.items() if getattr(evenness, name) > limit]
-    broken += [(name, "at least", limit) for name, limit in _LEAST.items() if getattr(evenness, name) < limit]
-    if broken and number > 1:
+    single = number == 1  # has no neighbours
+    most, least = ({"coverage": _MOST["coverage"]}, {}) if single else (_MOST, _LEAST)
+    broken = [(name, "at most", limit) for name, limit in most.items() if getattr(evenness, name) > limit]
+    broken += [(name, "at least", limit) for name, limit in least.items() if getattr(evenness, name) < limit]
+    if broken:
         told = [f"{name.replace('_', ' ')} {getattr(evenness, name):.2f} ({how} {limit:g})" for name, how, limit in broken]
         found.append(f"the particles lie less evenly than they should, in spacings: {', '.join(told)}")
     return found

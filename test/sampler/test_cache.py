@@ -107,7 +107,7 @@ def test_command_line(tmp_path):
     assert done.returncode == 0, done.stderr
     assert not done.stderr  # no greeting, and no complaint about a missing GPU
     rows = dict(line.split("  ", 1) for line in done.stdout.splitlines() if "  " in line)
-    for name in ("mended", "particles", "spacing h", "coverage", "thinnest wall", "mass", "time"):
+    for name in ("size", "mended", "particles", "spacing h", "coverage", "thinnest wall", "mass", "time"):
         assert name in rows
     body = load_body(tmp_path / "b.npz")
     assert abs(len(body) - 500) <= 5

@@ -37,3 +37,8 @@ def test_what_lies_otherwise_than_it_should_is_told():
     assert f"coverage {bar.evenness.coverage:.2f} (at most 1)" in bar.warnings[-1]
     large = sample_body(trimesh.creation.box((1.0, 1.0, 1.0)), radius=10.0)
     assert "about as large as the mesh, 1.73 m across" in large.warnings[-1]
+
+
+def test_what_a_single_particle_leaves_open_is_told():
+    assert "coverage" in sample_body(trimesh.creation.box((12.0, 1.0, 1.0)), radius=0.4, count=1).warnings[-1]
+    assert not sample_body(trimesh.creation.box((2.0, 1.0, 1.0)), radius=0.4, count=1).warnings
