@@ -13,6 +13,8 @@ _NEEDLESS = re.compile(
     rb"<!--.*?-->|<(bind_material|" + _LIBRARIES + rb"|instance_(?:light|camera)|lines|linestrips)\b[^>]*?(?:/>|>.*?</\1>)",
     re.DOTALL,
 )
+_SPACELESS = re.compile(rb"<COLLADA(?![^>]*\bxmlns\s*=)")
+_SPACE = b'<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"'
 _OTHER_INPUT = re.compile(rb"(<input\b[^>]*?\bsemantic\s*=\s*[\"'])(?!POSITION\b|VERTEX\b)\w+")
 
 
@@ -25,6 +27,7 @@ def plain_dae(name: str, data: bytes) -> bytes:
     # Normals and colours keep their place among the indices; nobody looks at tangents.
     data = _NEEDLESS.sub(lambda found: b"\n" * found.group().count(b"\n"), data)  # errors tell the number of the line
     data = _OTHER_INPUT.sub(rb"\1TANGENT", data)
+    data = _SPACELESS.sub(_SPACE, data, count=1)  # pycollada finds nothing in a file that does not say so
     root = ElementTree.fromstring(data)
     if not root.tag.endswith("COLLADA"):
         raise MeshError(f"mesh {name}: is no DAE file but begins with <{root.tag}>")

@@ -114,7 +114,7 @@ def dae_cubes():
     """Two cubes with edges of 0.5 m, 2 m apart."""
     nodes = "".join(f"<node><translate>{4 * k} 0 0</translate><instance_geometry url='#g{k}'/></node>" for k in range(2))
     return (
-        '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset><unit meter="0.5"/></asset>'
+        "<COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' version='1.4.1'><asset><unit meter='0.5'/></asset>"
         f"<library_geometries>{dae_cube('g0')}{dae_cube('g1')}</library_geometries>"
         f"<library_visual_scenes><visual_scene id='s'>{nodes}</visual_scene></library_visual_scenes>"
         "<scene><instance_visual_scene url='#s'/></scene></COLLADA>"
@@ -131,8 +131,10 @@ def dae_cubes():
         ("'NORMAL'", "'SMELL'"),
         ("</polylist>", "</polylist><linestrips count='1'><p>0 7</p></linestrips>"),
         ("<node>", "<node><instance_light url='#lost'/><!-- dark -->"),
+        ("xmlns='http://www.collada.org/2005/11/COLLADASchema'", ""),
+        ("2005/11/COLLADASchema' version='1.4.1'", "2008/03/COLLADASchema' version='1.5.0'"),
     ],
-    ids=["sound", "normal", "index-of-normal", "no-normal", "input", "lines", "light"],
+    ids=["sound", "normal", "index-of-normal", "no-normal", "input", "lines", "light", "no-namespace", "version-1.5"],
 )
 def test_dae_is_read_whatever_else_is_broken(tmp_path, old, new):
     (tmp_path / "cubes.dae").write_text(dae_cubes().replace(old, new))
@@ -158,7 +160,7 @@ def test_dae_is_read_whatever_else_is_broken(tmp_path, old, new):
         ("</polylist>", "</polylist><polygons><ph><p>0 0 0</p><h>1 0 0</h></ph></polygons>", "has <ph>"),
         ("count='8' stride='3'", "count='6' stride='4'", "something between its coordinates"),
         ("<instance_visual_scene url='#s'/>", "", "names no scene"),
-        ('"0.5"', '"0,5"', "its unit is '0,5' metres, which is no number"),
+        ("'0.5'", "'0,5'", "its unit is '0,5' metres, which is no number"),
         ("COLLADA", "html", "is no DAE file"),
     ],
 )
