@@ -8,7 +8,6 @@ from sampler.errors import MeshError
 from sampler.obj import plain_obj
 
 _POINTER = b"version https://git-lfs"
-_STL_HEADER, _STL_TRIANGLE = 84, 50  # bytes
 
 
 def check_file(path: Path) -> None:
@@ -27,41 +26,8 @@ def check_file(path: Path) -> None:
         raise MeshError(f"mesh {path.name}: is empty")
     if not path.suffix:
         raise MeshError(f"mesh {path.name}: has no ending that tells its format, as .stl or .obj; rename it")
-    check = {".stl": _check_stl, ".obj": _check_obj, ".glb": _check_glb}
+    check = {".obj": _check_obj, ".glb": _check_glb}
     check.get(path.suffix.lower(), lambda name, data: None)(path.name, data)
-
-
-def is_text_stl(data: bytes) -> bool:
-    """Whether an STL file is text; binary files may begin with ``solid`` too, but hold the triangles they promise."""
-    promised, held = _stl_triangles(data)
-    begins = data.lstrip(b"\xef\xbb\xbf \t\r\n")[:5].lower() == b"solid"
-    return begins and promised > held and re.search(rb"facet|endsolid", data, re.IGNORECASE) is not None
-
-
-def _stl_triangles(data: bytes) -> tuple[int, int]:
-    """How many triangles a binary STL file promises, and how many it holds."""
-    return int.from_bytes(data[80:_STL_HEADER], "little"), (len(data) - _STL_HEADER) // _STL_TRIANGLE
-
-
-def _check_stl(name: str, data: bytes) -> None:
-    if is_text_stl(data):
-        text = data.lower()
-        if text.rfind(b"endsolid") <= text.rfind(b"endfacet"):
-            raise MeshError(f"mesh {name}: is cut off: it does not end with 'endsolid'; copy or export it again")
-        if text.count(b"vertex") % 3 or text.count(b"endfacet") * 3 != text.count(b"vertex"):
-            raise MeshError(f"mesh {name}: is damaged: its facets do not have three vertices each; export it again")
-        return
-    if not re.search(rb"[\0-\x08\x0e-\x1f]", data[:500]):
-        raise MeshError(f"mesh {name}: is no STL file but other text: '{data.split()[0][:20].decode(errors='replace')} ...'")
-    if len(data) < _STL_HEADER:
-        raise MeshError(f"mesh {name}: is cut off: {len(data)} bytes are too few for an STL file")
-    promised, held = _stl_triangles(data)
-    if promised > held:
-        raise MeshError(f"mesh {name}: is cut off: it promises {promised} triangles and holds {held}; copy or export it again")
-    if promised < held and (len(data) - _STL_HEADER) % _STL_TRIANGLE == 0:
-        raise MeshError(f"mesh {name}: is damaged: it promises {promised} triangles and holds {held}; export it again")
-    if promised == 0:
-        raise MeshError(f"mesh {name}: has no triangles")
 
 
 def _check_obj(name: str, data: bytes) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from sampler.checking import check_file, is_text_stl
+from sampler.checking import check_file
 from sampler.dae import plain_dae
 from sampler.errors import MeshError
 from sampler.gltf import read_gltf
@@ -17,12 +17,13 @@ from sampler.off import read_off
 from sampler.options import is_positive
 from sampler.ply import read_ply
 from sampler.polygons import check_corners
+from sampler.stl import read_stl
 from sampler.threemf import read_3mf
 
 # What trimesh says of damage, with a traceback, of normals that nobody looks at too; what matters is told in one line here.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
-_OWN = {".ply": read_ply, ".off": read_off, ".3mf": read_3mf}
+_OWN = {"stl": read_stl, "ply": read_ply, "off": read_off, "3mf": read_3mf}
 _LETTERS = bytes(range(128)) + 128 * b"?"
 _WITH_UNIT = ("dae", "zae")  # files whose unit trimesh tells
 
@@ -82,12 +83,10 @@ def check_mesh(mesh: trimesh.Trimesh, name: str = "mesh") -> trimesh.Trimesh:
 def _load(path: Path) -> trimesh.Trimesh:
     """Everything that trimesh finds in a file, in one mesh, in metres where the file says what its unit is."""
     kind, data = path.suffix[1:].lower(), path.read_bytes()
-    if own := _OWN.get(path.suffix.lower()):
+    if own := _OWN.get(kind):
         return own(path.name, data)
     if kind in ("gltf", "glb"):
         return read_gltf(path, data)
-    if kind == "stl" and not is_text_stl(data):
-        return _read_stl(data)
     scene = _load_scene(path, kind, data)
     shapes = list(scene.geometry.values())
     if shapes and not any(isinstance(shape, trimesh.Trimesh) for shape in shapes):
@@ -112,19 +111,6 @@ def _load_scene(path: Path, kind: str, data: bytes) -> trimesh.Scene:
     if kind == "dae":
         data = plain_dae(path.name, data)
         return trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False, ignore_broken=False)
-    if kind in ("obj", "stl"):
-        data = plain_obj(data) if kind == "obj" else data
-        return trimesh.load_scene(io.BytesIO(_plain_letters(data)), file_type=kind, process=False)
+    if kind == "obj":  # names may be in any encoding
+        return trimesh.load_scene(io.BytesIO(plain_obj(data).translate(_LETTERS)), file_type=kind, process=False)
     return trimesh.load_scene(path, process=False)
-
-
-def _plain_letters(data: bytes) -> bytes:
-    """Text with other letters, as in names, replaced: nobody knows in which encoding they are."""
-    return data if data.isascii() else data.translate(_LETTERS)
-
-
-def _read_stl(data: bytes) -> trimesh.Trimesh:
-    """A binary STL file, also with bytes left over at its end, which trimesh does not take."""
-    row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    corners = np.frombuffer(data, row, int.from_bytes(data[80:84], "little"), 84)["corners"].astype(float)
-    return trimesh.Trimesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), process=False)

@@ -177,7 +177,15 @@ def stl_of(triangles):
     return b"\0" * 80 + struct.pack("<I", len(triangles)) + rows
 
 
-@pytest.mark.parametrize("write", [str.upper, lambda text: text.replace("solid ", "solid " + 3000 * "x", 1)])
+@pytest.mark.parametrize(
+    "write",
+    [
+        str.upper,
+        lambda text: text.replace("solid ", "solid " + 3000 * "x", 1),
+        lambda text: text.replace("solid ", "solid one facet of a vertex ", 1),
+        lambda text: text.replace("\n", "\r"),
+    ],
+)
 def test_text_stl_is_told_however_it_begins(tmp_path, box, write):
     text = box.export(file_type="stl_ascii")
     assert "solid " in text
