@@ -9,16 +9,14 @@ from sand_sim.integrator import VERLET
 def work_of_tools(assembly: Assembly) -> np.ndarray:
     """Work of each tool on the grains up to now, for the energy balance, shape (tools,) [J].
 
-    The solver sums up whole steps, each with the force at its begin. Half of the last one's belongs to the force at its end,
-    which is known only now.
+    The solver has summed it up to the middle of the last step; what is left of that belongs to the force at its end, which is
+    known only now.
     """
     tools, dt = assembly.solver.arrays.tools, assembly.time_step.value
     if tools is None:
         return np.zeros(0)
-    tracks = tools.tracks.numpy()
-    power = np.einsum("ij,ij->i", tools.wrench.numpy()[:, 0], tracks["velocity"])
-    power += np.einsum("ij,ij->i", tools.wrench.numpy()[:, 1], tracks["spin"])
-    return tools.work.numpy() - 0.5 * dt * np.where(_moving(assembly), power, 0.0) * (assembly.recipe.integrator == VERLET)
+    power = np.einsum("ijk,ijk->i", tools.wrench.numpy(), tools.twist.numpy())
+    return tools.work.numpy() - 0.5 * dt * power * (assembly.recipe.integrator == VERLET)
 
 
 def work_of_plungers(assembly: Assembly) -> np.ndarray:
@@ -38,9 +36,8 @@ def driven_speed(assembly: Assembly) -> float:
     """Speed of the fastest point of all tools and plungers over the last step [m/s]."""
     arrays, speeds = assembly.solver.arrays, [0.0]
     if arrays.tools:
-        tracks, extent = arrays.tools.tracks.numpy(), arrays.tools.shapes.numpy()["extent"]
-        rate = np.linalg.norm(tracks["velocity"], axis=1) + np.linalg.norm(tracks["spin"], axis=1) * extent
-        speeds += np.where(_moving(assembly), rate, 0.0).tolist()
+        velocity, spin = np.linalg.norm(arrays.tools.twist.numpy(), axis=2).T
+        speeds += (velocity + spin * arrays.tools.shapes.numpy()["extent"]).tolist()
     if arrays.plungers:
         speeds += np.abs(arrays.plungers.states.numpy()["velocity"]).tolist()
     return max(speeds)
@@ -53,10 +50,3 @@ def forces_on_walls(assembly: Assembly) -> np.ndarray:
     wall = np.searchsorted(arrays.walls.numpy()["first"], contacts.partner.numpy()[:number], side="right") - 1
     force = contacts.force.numpy()[:number, :3].astype(float)
     return -np.column_stack([np.bincount(wall, force[:, k], len(assembly.walls)) for k in range(3)]).astype(float)
-
-
-def _moving(assembly: Assembly) -> np.ndarray:
-    """Whether each tool has moved in the last step, shape (tools,)."""
-    tracks, dt = assembly.solver.arrays.tools.tracks.numpy(), assembly.time_step.value
-    middle = (assembly.solver.steps_done - 0.5) * dt
-    return (tracks["begin_time"] <= middle) & (middle < tracks["end_time"])

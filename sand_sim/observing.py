@@ -144,11 +144,10 @@ def observe_tools(
     tools = assembly.solver.arrays.tools
     if tools is None:
         return ()
-    work = tools.work.numpy()
+    work, twist = tools.work.numpy(), tools.twist.numpy().copy()
     reports = []
     for index, (model, track) in enumerate(zip(assembly.tools, tracks, strict=True)):  # terrains come after the tools
         position, orientation = track.at(time)
-        moving = track.moving_at(time - 0.5 * assembly.time_step.value)
         back = rotation.inverse(orientation)
         force, torque = means[index]
         reports.append(
@@ -156,8 +155,8 @@ def observe_tools(
                 name=model.tool.name,
                 position=position,
                 orientation=orientation,
-                velocity=track.velocity if moving else np.zeros(3),
-                spin=track.spin if moving else np.zeros(3),
+                velocity=twist[index, 0],
+                spin=twist[index, 1],
                 force=rotation.rotate(back, force),
                 torque=rotation.rotate(back, torque),
                 world_force=force.copy(),

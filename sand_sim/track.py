@@ -51,10 +51,6 @@ class Track:
         position = self.begin_position + self.velocity * passed
         return position, rotation.multiply(rotation.from_vector(self.spin * passed), self.begin_orientation)
 
-    def moving_at(self, time: float) -> bool:
-        """Whether the tool is on its way at a time [s]."""
-        return self.begin_time <= time < self.end_time
-
     @property
     def _duration(self) -> float:
         return self.end_time - self.begin_time if self.end_time > self.begin_time else np.inf

@@ -137,18 +137,20 @@ class World(Changeable):
         tool, index, now = f"tool '{command.tool}'", self._tool_index[command.tool], self.time
         if command.time is not None and command.time <= now:
             raise CommandError("late", f"{tool}: time {command.time:.6f} s has passed, simulated time is {now:.6f} s")
-        fastest = self.tools[index].tool.max_speed
-        soonest = now + self.travel(command) / fastest
+        fastest, track = self.tools[index].tool.max_speed, self._tracks[index]
+        # Most poses end between two steps; a tool that rested for the rest of the step would move less far than grains feel.
+        begin = track.end_time if 0.0 <= now - track.end_time < self.time_step else now
+        soonest = begin + self.travel(command) / fastest
         end = max(soonest, now + self.time_step) if command.time is None else command.time
-        begin_position, begin_orientation = self._tracks[index].at(now)
-        speed = (soonest - now) / (end - now) * fastest
+        begin_position, begin_orientation = track.at(begin)
+        speed = (soonest - begin) / (end - begin) * fastest
         if speed > fastest * _SPEED_TOLERANCE:
             raise CommandError(
                 "too_fast",
                 f"{tool} would move at {speed:.3g} m/s, its max_speed is {fastest:.3g} m/s; "
                 "command nearer poses or later times, or raise max_speed in the scene",
             )
-        track = Track(now, end, begin_position, command.position, begin_orientation, command.orientation)
+        track = Track(begin, end, begin_position, command.position, begin_orientation, command.orientation)
         self._swept.pass_by(index, begin_position, begin_orientation)
         self._set_tracks([*self._tracks[:index], track, *self._tracks[index + 1 :]])
 

@@ -70,9 +70,14 @@ def sum_impulses(
     steps_done: wp.array(dtype=wp.int64),
     wrench: wp.array2d(dtype=wp.vec3d),
     impulse: wp.array2d(dtype=wp.vec3d),
+    twist: wp.array2d(dtype=wp.vec3d),
     work: wp.array(dtype=wp.float64),
 ):
-    """Impulse of the wrenches over the frame, shape (tools, 2), and work of the tools on the sand since the start."""
+    """Impulse of the wrenches over the frame, shape (tools, 2), and work of the tools on the sand since the start.
+
+    The work of a wrench is that over half the step before and half the step after, between which a tool may change its velocity.
+    ``twist`` has shape (tools, 2): velocity of the frame's origin and spin over the step before, then over the step after.
+    """
     time = wp.float64(steps_done[0]) * dt
     for tool in range(wrench.shape[0]):
         force = wrench[tool, 0]
@@ -80,8 +85,15 @@ def sum_impulses(
         impulse[tool, 0] = impulse[tool, 0] + force * dt
         impulse[tool, 1] = impulse[tool, 1] + torque * dt
         track = tracks[tool]
+        velocity = wp.vec3d(wp.float64(0.0))
+        spin = wp.vec3d(wp.float64(0.0))
         if time >= track.begin_time and time < track.end_time:
-            work[tool] = work[tool] - (wp.dot(force, track.velocity) + wp.dot(torque, track.spin)) * dt
+            velocity = track.velocity
+            spin = track.spin
+        power = wp.dot(force, twist[tool, 0] + velocity) + wp.dot(torque, twist[tool, 1] + spin)
+        work[tool] = work[tool] - wp.float64(0.5) * power * dt
+        twist[tool, 0] = velocity
+        twist[tool, 1] = spin
 
 
 @kernel

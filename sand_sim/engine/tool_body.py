@@ -38,7 +38,8 @@ class Tools:
         shapes, states, tracks: structs of ``tools.py``, shape (tools,).
         travelled: bound of each tool's motion since the list was made, shape (tools,) [m].
         wrench, impulse: force and torque of the sand now, and over the frame, vec3d, shape (tools, 2).
-        work: of the tool on the sand since the start, shape (tools,) [J].
+        twist: velocity of the frame's origin and spin over the last step, world frame, vec3d, shape (tools, 2) [m/s], [rad/s].
+        work: of the tool on the sand up to the middle of the last step, shape (tools,) [J].
         smooth: surfaces of the smooth ones; None if there are none.
     """
 
@@ -82,6 +83,7 @@ class Tools:
         self.travelled = wp.zeros(self.number, dtype=wp.float64, device=device)
         self.wrench = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
         self.impulse = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
+        self.twist = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
         self.work = wp.zeros(self.number, dtype=wp.float64, device=device)
         surfaces = [body.triangles for body in bodies]
         self.smooth = None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 import yaml
-from scenes import SceneMaker, record, write_small_scene
+from scenes import SceneMaker, floor, record, write_small_scene
 
 from sand_sim import CommandError, SceneError, ToolPose, World, read_scene
 from sand_sim.playing import commands_at
@@ -202,3 +202,38 @@ def test_list_that_outgrows_its_room_changes_nothing(tmp_path):
     assert last[1].tool("plate").work == pytest.approx(last[0].tool("plate").work, rel=1e-9)
     assert last[1].health.deepest == pytest.approx(last[0].health.deepest, rel=1e-9)
     assert np.abs(last[1].grains.position - last[0].grains.position).max() < 1e-12
+
+
+@pytest.mark.parametrize("integrator", ["velocity_verlet", "symplectic_euler"])
+def test_work_of_a_tool_that_changes_its_speed_in_contact(make_plate_world, integrator):
+    """A plate shakes on an elastic grain on a floor and never lets go: nothing is lost or gained, cycle after cycle."""
+    further = {"boundaries": floor(-0.012), "restitution": 1.0, "friction": 0.0, "integrator": integrator, "time_step": 2e-5}
+    pose = {"contact": "smooth", "pose": {"position": [0.0, 0.0, 0.0025]}}
+    world = make_plate_world([[0.0, 0.0, -0.007]], pose=pose, **further)
+    for cycle in range(21):
+        for part in range(1, 11):
+            place = np.array([0.0, 0.0, 0.0018 + 0.0001 * np.cos(0.2 * np.pi * part)])
+            world.apply(ToolPose("plate", place, NO_TURN, 0.01 * cycle + 0.001 * part))
+            world.step(round((0.01 * cycle + 0.001 * part - world.time) / world.time_step))
+    seen = world.observe()
+    assert seen.health.tool_work == pytest.approx(seen.health.kinetic + seen.health.elastic, rel=0.01)
+    assert not seen.health.doubts
+
+
+def test_grain_on_a_tool_keeps_to_it_whatever_the_poses_and_the_step(make_plate_world):
+    """Poses come every millisecond, in which there are 10.75 steps: a tripod that is carried along does not creep ahead."""
+    feet = [[0.01, 0.0, 0.0, 0.005], [-0.005, 0.00866, 0.0, 0.005], [-0.005, -0.00866, 0.0, 0.005]]
+    bodies = {"tripod": {"spheres": feet, "material": "grain", "pose": {"position": [0.0, 0.0, 0.005]}}}
+    further = {"bodies": bodies, "gravity": [0.0, 0.0, -9.81], "friction": 0.5, "time_step": 0.93e-4, "force_time_step": True}
+    soft = {"density": 2500.0, "young": 1e6, "poisson": 0.25}
+    world = make_plate_world([[0.15, 0.0, 0.1]], pose={"contact": "smooth"}, material=soft, wall=soft, **further)
+    world.step(round(0.1 / world.time_step))
+    first = world.observe()
+    for k in range(1, 301):  # up to 0.3 m/s, then on
+        time = 0.001 * k
+        x = 0.5 * time**2 if k <= 100 else 0.005 + 0.1 * (time - 0.1)
+        world.apply(ToolPose("plate", np.array([x, 0.0, 0.0]), NO_TURN, 0.1 + time))
+        world.step(round((0.1 + time - world.time) / world.time_step))
+    last = world.observe()
+    shift = [seen.body("tripod").position[0] - seen.tool("plate").position[0] for seen in (first, last)]
+    assert abs(shift[1] - shift[0]) < 3e-5
