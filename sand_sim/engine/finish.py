@@ -23,6 +23,7 @@ def build_place_tools(precision: Precision) -> wp.Kernel:
     @kernel
     def place_tools(
         tracks: wp.array(dtype=ToolTrack),
+        twist: wp.array2d(dtype=wp.vec3d),
         shapes: wp.array(dtype=shape_type),
         states: wp.array(dtype=state_type),
         centre: wp.vec3d,
@@ -42,7 +43,7 @@ def build_place_tools(precision: Precision) -> wp.Kernel:
                 travelled[tool] = travelled[tool] + rate * dt
                 if travelled[tool] * inverse_quantum > wp.float64(0.5) * skin[0]:
                     tools_moved[0] = 1
-            states[tool] = tool_state_at(track, time, centre, inverse_quantum, end)
+            states[tool] = tool_state_at(track, twist[tool, 0], twist[tool, 1], time, centre, inverse_quantum, end)
 
     return place_tools
 

@@ -275,6 +275,7 @@ def place_tools(arrays: DemArrays, recorder) -> None:
         finish.build_place_tools(arrays.recipe.precision),
         [
             tools.tracks,
+            tools.twist,
             tools.shapes,
             tools.states,
             wp.vec3d(*lattice.centre),

@@ -40,8 +40,8 @@ def tool_types(precision: Precision):
     class ToolState:
         place: whole3  # [quantum] tool frame's origin
         rotation: quat  # [1] tool frame to world frame
-        velocity: vec3  # [m/s] of the origin, world frame
-        spin: vec3  # [rad/s] world frame
+        velocity: vec3  # [m/s] of the origin over the last step, world frame
+        spin: vec3  # [rad/s] over the last step, world frame
 
     return ToolShape, ToolState
 
@@ -59,16 +59,24 @@ def rotation_at(track: ToolTrack, time: wp.float64) -> wp.quatd:
 
 @cache
 def build_tool_state_at(precision: Precision) -> wp.Function:
-    """Warp function ``(track, time, centre, inverse_quantum, end) -> ToolState``; before and after its track a tool rests.
+    """Warp function ``(track, velocity, spin, time, centre, inverse_quantum, end) -> ToolState``.
 
-    A tool beyond the lattice is held at its end, too far from the domain to touch a grain.
+    Velocity and spin are those of the last step, so that forces do not depend on where the tool will be sent next, and springs
+    grow by the way that it has gone. Before and after its track a tool rests. A tool beyond the lattice is held at its end, too
+    far from the domain to touch a grain.
     """
     real, vec3, quat, whole, whole3 = precision.real, precision.vec3, precision.quat, precision.whole, precision.whole3
     _, state_type = tool_types(precision)
 
     @wp.func
     def tool_state_at(
-        track: ToolTrack, time: wp.float64, centre: wp.vec3d, inverse_quantum: wp.float64, end: wp.float64
+        track: ToolTrack,
+        velocity: wp.vec3d,
+        spin: wp.vec3d,
+        time: wp.float64,
+        centre: wp.vec3d,
+        inverse_quantum: wp.float64,
+        end: wp.float64,
     ) -> state_type:
         passed = wp.clamp(time, track.begin_time, track.end_time) - track.begin_time
         position = (track.begin_position + track.velocity * passed - centre) * inverse_quantum
@@ -80,11 +88,8 @@ def build_tool_state_at(precision: Precision) -> wp.Function:
             whole(wp.rint(wp.clamp(position[2], -end, end))),
         )
         state.rotation = quat(real(rotation[0]), real(rotation[1]), real(rotation[2]), real(rotation[3]))
-        state.velocity = vec3(real(0.0))
-        state.spin = vec3(real(0.0))
-        if time >= track.begin_time and time < track.end_time:
-            state.velocity = vec3(real(track.velocity[0]), real(track.velocity[1]), real(track.velocity[2]))
-            state.spin = vec3(real(track.spin[0]), real(track.spin[1]), real(track.spin[2]))
+        state.velocity = vec3(real(velocity[0]), real(velocity[1]), real(velocity[2]))
+        state.spin = vec3(real(spin[0]), real(spin[1]), real(spin[2]))
         return state
 
     return tool_state_at

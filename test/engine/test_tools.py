@@ -237,3 +237,18 @@ def test_grain_on_a_tool_keeps_to_it_whatever_the_poses_and_the_step(make_plate_
     last = world.observe()
     shift = [seen.body("tripod").position[0] - seen.tool("plate").position[0] for seen in (first, last)]
     assert abs(shift[1] - shift[0]) < 3e-5
+
+
+def test_contacts_are_the_same_whether_the_way_comes_in_one_pose_or_in_many(make_plate_world):
+    """A plate pushes a grain that is braked by its damping; where a pose ends, none is felt as if the plate stood still."""
+    seen = []
+    for poses in (1, 5):
+        world = make_plate_world([[0.0, 0.0, 0.00501]], restitution=0.2, gravity=[0.0, 0.0, -9.81], pose={"contact": "smooth"})
+        for k in range(1, poses + 1):
+            time = 15 * k // poses * world.time_step
+            world.apply(ToolPose("plate", np.array([0.0, 0.0, 0.3 * time]), NO_TURN, time))
+            world.step(round((time - world.time) / world.time_step))
+        seen.append((world.tool_contacts("plate").force, world.observe().grains.velocity))
+    assert np.linalg.norm(seen[0][0]) > 0.0
+    assert seen[1][0] == pytest.approx(seen[0][0], rel=1e-6)
+    assert seen[1][1] == pytest.approx(seen[0][1], rel=1e-6)
