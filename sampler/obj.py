@@ -8,9 +8,18 @@ from sampler.caps import span_loop
 from sampler.polygons import are_hollow
 
 _MARK = b"\xef\xbb\xbf"  # of UTF-8, which some editors put first
+_BESIDE = re.compile(rb"(?<=\d)/\S*")
 _POLYGON = re.compile(rb"\nf((?: +\d\S*){4,}) *\r?(?=\n)")
 _VERTEX = re.compile(rb"\nv +(\S+) +(\S+) +(\S+)")
 _ODD = re.compile(rb"\n(?:[ \t]+[vf]|[vf]n?\t|f[^\n-]*-)")  # indented, followed by a tab, counted backwards
+
+
+def bare_obj(data: bytes) -> bytes:
+    """Write an OBJ file plainly and without textures and normals.
+
+    Nobody looks at them, and trimesh takes one for a vertex where not all corners of a face have as many.
+    """
+    return _BESIDE.sub(b"", plain_obj(data))
 
 
 def plain_obj(data: bytes) -> bytes:

@@ -12,7 +12,7 @@ from sampler.checking import check_file
 from sampler.dae import plain_dae
 from sampler.errors import MeshError
 from sampler.gltf import read_gltf
-from sampler.obj import plain_obj
+from sampler.obj import bare_obj
 from sampler.off import read_off
 from sampler.options import is_positive
 from sampler.ply import read_ply
@@ -112,5 +112,5 @@ def _load_scene(path: Path, kind: str, data: bytes) -> trimesh.Scene:
         data = plain_dae(path.name, data)
         return trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False, ignore_broken=False)
     if kind == "obj":  # names may be in any encoding
-        return trimesh.load_scene(io.BytesIO(plain_obj(data).translate(_LETTERS)), file_type=kind, process=False)
+        return trimesh.load_scene(io.BytesIO(bare_obj(data).translate(_LETTERS)), file_type=kind, process=False)
     return trimesh.load_scene(path, process=False)

@@ -79,6 +79,13 @@ def test_vertices_without_three_coordinates_are_refused(tmp_path, old):
         read_mesh(tmp_path / "flat.obj", scale=0.5)
 
 
+def test_corners_of_obj_with_and_without_texture_and_normal_are_read(tmp_path):
+    forms = ["{}", "{}/2", "{}//3", "{}/2/3"]
+    mixed = [[forms[(row + k) % 4].format(corner) for k, corner in enumerate(square)] for row, square in enumerate(SQUARES)]
+    (tmp_path / "mixed.obj").write_text("vt 0 0\nvt 1 1\n" + 3 * "vn 0 0 1\n" + obj_cube(0, mixed))
+    assert read_mesh(tmp_path / "mixed.obj").volume == pytest.approx(1.0)
+
+
 def test_a_face_of_obj_without_corners_is_refused(tmp_path):
     (tmp_path / "bare.obj").write_text(obj_cube().replace("f 1 2 4 3\n", "f\n"))
     with pytest.raises(MeshError, match="the face 'f' has too few corners"):
