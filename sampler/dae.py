@@ -72,13 +72,18 @@ def _check_positions(name: str, root: ElementTree.Element) -> None:
 
 
 def _check_indices(name: str, root: ElementTree.Element) -> None:
-    """Indices that are too large are refused by pycollada; those below zero would count from the end."""
+    """Indices that are too large are refused by pycollada; those below zero would count from the end, lost ones not be missed."""
     for primitive in root.iterfind(".//{*}input[@semantic='VERTEX']/.."):
         offset = int(primitive.find("{*}input[@semantic='VERTEX']").get("offset", 0))
         stride = 1 + max(int(other.get("offset", 0)) for other in primitive.iterfind("{*}input"))
-        for text in [indices.text or "" for indices in primitive.iterfind("{*}p")]:
+        texts = [indices.text or "" for indices in primitive.iterfind("{*}p")]
+        for text in texts:
             if "-" in text and "-" in "".join(text.split()[offset::stride]):
                 raise MeshError(f"mesh {name}: is damaged: a triangle has a vertex numbered below zero; export it again")
+        if primitive.tag.endswith("}triangles") and "count" in primitive.attrib:
+            promised, held = int(primitive.get("count")), sum(len(text.split()) for text in texts) / (3 * stride)
+            if promised != held:
+                raise MeshError(f"mesh {name}: is damaged: it promises {promised} triangles and holds {held:g}; export it again")
 
 
 def _cut_hollow_polygons(root: ElementTree.Element) -> bool:

@@ -53,7 +53,7 @@ def read_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
         raise MeshError(f"mesh {path.name}: is damaged, or needs what is not installed: {error}") from None
     except NotImplementedError:
         raise MeshError(
-            f"mesh {path.name}: {path.suffix} files are not read; export it as STL, OBJ, PLY, DAE, glTF or 3MF"
+            f"mesh {path.name}: cannot be read: {path.suffix} files are not known; export it as STL, OBJ, PLY, DAE, glTF or 3MF"
         ) from None
     except Exception as error:  # trimesh raises whatever its many parsers raise
         raise MeshError(f"mesh {path.name}: cannot be read as {path.suffix or 'a mesh'}: {error}") from None

@@ -222,7 +222,9 @@ def test_names_in_other_letters_do_no_harm(tmp_path, box, kind):
 def test_files_that_are_not_read_are_told_with_what_is(tmp_path, kind):
     path = tmp_path / f"robot.{kind}"
     path.write_bytes(b"#VRML V2.0 utf8")
-    with pytest.raises(MeshError, match=rf"\.{kind} files are not read; export it as STL, OBJ, PLY, DAE, glTF or 3MF"):
+    with pytest.raises(
+        MeshError, match=rf"cannot be read: \.{kind} files are not known; export it as STL, OBJ, PLY, DAE, glTF or 3MF"
+    ):
         read_mesh(path)
 
 

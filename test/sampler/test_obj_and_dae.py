@@ -164,6 +164,11 @@ def test_dae_is_read_whatever_else_is_broken(tmp_path, old, new):
         ("source='#g1-p'", "source='#lost'", "names the coordinates 'lost' and does not hold them"),
         ("<instance_geometry url='#g1'/>", "<instance_controller url='#bones'/>", "has <instance_controller>"),
         ("<translate>4 0 0</translate>", "<skew>45 0 1 0 1 0 0</skew>", "has <skew>"),
+        (
+            "</polylist>",
+            "</polylist><triangles count='2'><input semantic='VERTEX' source='#g0-v'/><p>0 1 2</p></triangles>",
+            "holds 1",
+        ),
         ("</polylist>", "</polylist><polygons><ph><p>0 0 0</p><h>1 0 0</h></ph></polygons>", "has <ph>"),
         ("count='8' stride='3'", "count='6' stride='4'", "something between its coordinates"),
         ("<instance_visual_scene url='#s'/>", "", "names no scene"),
