@@ -42,7 +42,7 @@ def test_meshes_are_read(tmp_path, kind):
         ("pointer.stl", b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n", "is a Git LFS pointer"),
         ("nan.obj", b"v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "mesh nan.obj"),
         ("flat.obj", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "mesh flat.obj"),
-        ("what.xyz123", b"?", "mesh what.xyz123: .xyz123 files are not read"),
+        ("what.xyz123", b"?", "mesh what.xyz123: cannot be read: .xyz123 files are not known"),
     ],
 )
 def test_bad_meshes_are_refused(tmp_path, name, content, reason):
