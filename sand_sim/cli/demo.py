@@ -42,20 +42,22 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     summary.unlink(missing_ok=True)
     node = _start(["-m", "sand_sim.node", "--ros-args", *assignments], environment)
     client = _start(["-m", "sand_sim", "play", str(path)], environment)
-    while node.poll() is None:
+    while node.poll() is None and not client.poll():  # for a client that has failed the node would wait for ever
         try:
             node.wait(0.2)
         except subprocess.TimeoutExpired:
             if interruption.asked:
                 break
+    failed = client.poll() or 0
     for process in (client, node):
         _end(process)
+    code = 130 if interruption.asked else node.returncode or failed
     if not summary.is_file():
-        return 130 if interruption.asked else node.returncode or 1
+        return code or 1
     print(f"{scene.name}:\n{summary_text(json.loads(summary.read_text()))}")
     files = [options.out / f"{scene.name}.{kind}" for kind in ("rrd", "png", "npz", "json")]
     print("written: " + ", ".join(str(file) for file in files if file.is_file()))
-    return 130 if interruption.asked else node.returncode
+    return code
 
 
 def _start(words: list[str], environment: dict[str, str]) -> subprocess.Popen:

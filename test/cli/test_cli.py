@@ -147,6 +147,15 @@ def test_demo_without_its_recording_says_so(tmp_path):
     assert "written: results/small.png, results/small.npz, results/small.json" in output
 
 
+def test_a_demo_with_nothing_to_play_ends(tmp_path):
+    pytest.importorskip("rclpy", reason="needs ROS 2")
+    plate = {"mesh": "plate.stl", "material": "steel", "particle_radius": 0.003, "pose": {"position": [0.0, 0.0, 0.06]}}
+    scene = write_small_scene(tmp_path, tools={"plate": plate})
+    code, _, errors = finish(sand_sim(tmp_path, "demo", scene, "--out", "results"))
+    assert code == 1
+    assert "sand_sim: scene 'small' has no tool with a trajectory, so there is nothing to play" in errors
+
+
 @pytest.mark.parametrize("delay", [0.5, 4.0])
 def test_ctrl_c_ends_the_demo_and_its_processes(tmp_path, delay):
     pytest.importorskip("rclpy", reason="needs ROS 2")
