@@ -242,9 +242,10 @@ def _tool(name: str, entry: Field) -> Tool:
         time = stop["time"].number(least=0.0, unit="s")
         if track and time <= track[-1].time:
             raise stop["time"].refuse(f"must be later than the waypoint before, at {track[-1].time:g} s")
+        widest = {"widest": math.inf} if angles else {}  # on from there, a tool may turn as often as it likes
         angles = _turn_from(angles, stop["rpy"]) if "rpy" in stop else None
         pose = {key: stop.value[key] for key in ("position", "orientation", "rpy") if key in stop.value}
-        track.append(Waypoint(time, read_pose(Field(pose, stop.path)), stop.optional("phase", Field.text, "")))
+        track.append(Waypoint(time, read_pose(Field(pose, stop.path), **widest), stop.optional("phase", Field.text, "")))
     initial = track[0].pose if track and "pose" not in entry else Pose()
     return Tool(
         name,

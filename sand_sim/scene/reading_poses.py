@@ -1,18 +1,28 @@
 """Poses in a scene file."""
 
+import math
+
 from sand_sim import rotation
 from sand_sim.scene.fields import Field
 from sand_sim.scene.types import Pose
 
+_WHOLE_TURN = 2.0 * math.pi
 
-def read_pose(entry: Field) -> Pose:
-    """A pose from ``position`` [m] and ``orientation`` (x y z w) or ``rpy`` [rad]."""
+
+def read_pose(entry: Field, widest: float = _WHOLE_TURN) -> Pose:
+    """A pose from ``position`` [m] and ``orientation`` (x y z w) or ``rpy`` [rad], of angles up to the widest [rad]."""
     entry.keys(("position", "orientation", "rpy"))
     position = entry.optional("position", Field.vector, (0.0, 0.0, 0.0))
     if "rpy" in entry:
         if "orientation" in entry:
             raise entry.refuse("give only one of 'orientation' and 'rpy'")
-        return Pose(position, tuple(map(float, rotation.from_rpy(*entry["rpy"].vector()))))
+        angles = entry["rpy"].vector()
+        if max(map(abs, angles)) > widest:
+            raise entry["rpy"].refuse(
+                f"is in radians, and {list(angles)} is more than a whole turn; in degrees it would be "
+                f"{[round(math.radians(angle), 4) for angle in angles]}"
+            )
+        return Pose(position, tuple(map(float, rotation.from_rpy(*angles))))
     if "orientation" not in entry:
         return Pose(position)
     quaternion = entry["orientation"].vector(4)

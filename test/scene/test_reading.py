@@ -84,6 +84,13 @@ def test_good_scene_is_read():
             {"orientation": [0, 0, 0, 1], "rpy": [0, 1, 0]},
             "tools.spade.pose: give only one of 'orientation' and 'rpy'",
         ),
+        (
+            ("tools", "spade", "pose"),
+            {"rpy": [0, 90, -45]},
+            "tools.spade.pose.rpy: is in radians, and [0.0, 90.0, -45.0] is more than a whole turn; in degrees it would be "
+            "[0.0, 1.5708, -0.7854]",
+        ),
+        (("tools", "spade", "trajectory"), [{"time": 0, "rpy": [0, 30, 0]}], "tools.spade.trajectory[0].rpy: is in radians"),
         (("tools", "my spade"), GOOD["tools"]["spade"], "tools.my spade: a tool's name becomes part of its topics"),
         (("tools", "sch\u00fcrfe"), GOOD["tools"]["spade"], "a tool's name becomes part of its topics"),
         (("contact",), {"normal": "hertzz"}, "contact.normal: unknown 'hertzz'; known are"),
