@@ -33,6 +33,11 @@ class BodyModel:
     mass: float
     gyration: np.ndarray
 
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        return f"body '{self.body.name}'"
+
     def table(self, material: int) -> GrainTable:
         """The body and its spheres where the scene puts them, of the material with this index."""
         pose = self.body.pose

@@ -38,15 +38,15 @@ def find_obstacles(
     blocked = {"grains": _gather(grains), "one another": _gather(each_other)}
     for wall, offset in zip(assembly.walls, _offsets(assembly), strict=True):
         near = wall.distance(position - offset * wall.direction) < radius - spare
-        blocked[f"wall '{wall.name}'"] = np.flatnonzero(near)
-    solids = [(f"tool '{m.tool.name}'", m, m.tool.pose, pose) for m, pose in zip(assembly.tools, poses, strict=True)]
-    solids += [(f"terrain '{g.name}'", g, g.pose, (g.place, g.pose.orientation)) for g in assembly.grounds]
+        blocked[wall.label] = np.flatnonzero(near)
+    solids = [(m, m.tool.pose, pose) for m, pose in zip(assembly.tools, poses, strict=True)]
+    solids += [(g, g.pose, (g.place, g.pose.orientation)) for g in assembly.grounds]
     models = {model.body.name: model for model in assembly.bodies}
     for report in observe_bodies(assembly, observe_grains(assembly, spheres)):
         model = models[report.name]
-        solids.append((f"body '{report.name}'", model, model.body.pose, (report.position, report.orientation)))
-    for name, solid, start, now in solids:
-        blocked[name] = np.flatnonzero(solid.distance(as_at_start(position, start, now)) < radius - spare)
+        solids.append((model, model.body.pose, (report.position, report.orientation)))
+    for solid, start, now in solids:
+        blocked[solid.label] = np.flatnonzero(solid.distance(as_at_start(position, start, now)) < radius - spare)
     return {name: np.unique(which) for name, which in blocked.items() if len(which)}
 
 

@@ -33,6 +33,11 @@ class Ground:
     body: ParticleBody
 
     @property
+    def label(self) -> str:
+        """What messages call it."""
+        return f"terrain '{self.name}'"
+
+    @property
     def pose(self) -> Pose:
         """Of the frame."""
         return Pose(tuple(self.place.tolist()))

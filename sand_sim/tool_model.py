@@ -32,6 +32,11 @@ class ToolModel:
     surface: np.ndarray | None = None
 
     @property
+    def label(self) -> str:
+        """What messages call it."""
+        return f"tool '{self.tool.name}'"
+
+    @property
     def smooth(self) -> bool:
         """Whether grains touch the mesh itself."""
         return self.surface is not None

@@ -48,12 +48,16 @@ def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -
     random = np.random.default_rng(fill.seed)
     largest = _largest(fill.size) * (shape.bounding_radius / shape.equal_radius if shape else 1.0)
     points = _lattice(fill, largest, random)
+    places, taken = len(points), []
     for wall in walls:
-        points = points[_clear(wall, points, largest)]
+        clear = _clear(wall, points, largest)
+        taken.append((wall.label, len(points) - clear.sum()))
+        points = points[clear]
     wanted = fill.count or _count_for_height(fill, walls, random)
     if wanted > len(points):
+        cause = "".join(f"; {what} takes {some} of its {places} places" for what, some in taken if 2 * some > places)
         raise SceneError(
-            f"fills: '{fill.name}' has room for {len(points)} loosely packed grains but {wanted} are wanted; "
+            f"fills: '{fill.name}' has room for {len(points)} loosely packed grains but {wanted} are wanted{cause}; "
             "enlarge 'region' or ask for fewer grains"
         )
     radius = _draw(fill.size, wanted, random)

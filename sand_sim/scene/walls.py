@@ -43,6 +43,11 @@ class Wall:
     rough: Rough | None = None
     drive: Drive | None = None
 
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        return f"wall '{self.name}'"
+
     def distance(self, position: np.ndarray) -> np.ndarray:
         """Distance of points, shape (n, 3) [m], from the surface, shape (n,) [m]; positive where a fill may put grains.
 

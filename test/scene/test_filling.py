@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from scenes import SceneMaker
+import yaml
+from scenes import SceneMaker, write_small_scene
 
 from sand_sim import SceneError, World, read_scene
 from sand_sim.scene.filling import fill_grains
@@ -78,6 +79,15 @@ def test_grains_too_fine_for_their_region_are_refused(radius):
 def test_too_many_grains_are_refused():
     with pytest.raises(SceneError, match=r"'bed' has room for \d+ loosely packed grains but 100000 are wanted"):
         fill_grains(fill(count=100_000), SAND, 0, [])
+
+
+def test_what_takes_the_room_of_the_grains_is_named(tmp_path):
+    """Mostly it is a tool or its particles in another unit."""
+    scene = yaml.safe_load(write_small_scene(tmp_path).read_text())
+    scene["fills"] = [{"material": "sand", "radius": 0.005, "region": {"low": [0, 0, 0], "high": [0.1, 0.1, 0.1]}, "count": 50}]
+    scene["tools"]["plate"]["particle_radius"] = 3
+    with pytest.raises(SceneError, match=r"room for 0 loosely packed .* wanted; tool 'plate' takes 729 of its 729 places"):
+        World(read_scene(scene, tmp_path))
 
 
 def settled(tmp_path, fills, boundaries):
