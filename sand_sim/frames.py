@@ -55,6 +55,8 @@ class FrameTree:
                 known = ", ".join(sorted([self.root, *self._frames])[:20])
                 bare = start.lstrip("/") or self.root
                 hint = f"; say '{bare}'" if bare != start and bare in (self.root, *self._frames) else ""
+                if frame is None and name != start:
+                    hint = f": nothing tells where '{name}' is"
                 raise CommandError("unknown_frame", f"frame '{start}' does not hang on '{self.root}'{hint}; known are {known}")
             yield frame
             name = frame.parent

@@ -45,6 +45,14 @@ def test_frames_that_do_not_hang_on_the_root_are_named():
         assert caught.value.reason == "unknown_frame"
 
 
+def test_where_a_chain_of_frames_is_broken_is_told():
+    tree = FrameTree("world")
+    tree.put(Frame("arm", "base", np.zeros(3), NO_TURN))
+    tree.put(Frame("wrist", "arm", np.zeros(3), NO_TURN))
+    with pytest.raises(CommandError, match="'wrist' does not hang on 'world': nothing tells where 'base' is; known are arm"):
+        tree.in_root("wrist", np.zeros(3), NO_TURN)
+
+
 @pytest.mark.parametrize(
     ("frame", "reason"),
     [
