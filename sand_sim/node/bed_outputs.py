@@ -99,7 +99,10 @@ class BedOutputs:
         if any(region):
             grains = select_box(grains, region[:3], region[3:])
         if edge:
-            grains = select_voxels(grains, edge)
+            try:
+                grains = select_voxels(grains, edge)
+            except ValueError as error:
+                raise ValueError(f"parameter points_voxel: {error}") from None
         if step > 1:
             grains = select_every(grains, step)
         self._points.publish(

@@ -113,3 +113,13 @@ def test_parameters_that_nobody_declares_are_named(client, start_node):
         "there is no parameter 'tools.plaet.source'; is 'tools.plate.source' meant?",
         "there is no parameter 'zzz'",
     ]
+
+
+def test_a_cloud_that_cannot_be_thinned_out_names_the_parameter(client, start_node):
+    heard = []
+    client.node.create_subscription(Log, "/rosout", lambda log: heard.append(log.msg), LATCHED)
+    node = start_node(pacing="lockstep", points_voxel=1e-9)
+    told = "a cloud could not be told: parameter points_voxel: edge: 1e-09 m is too small"
+    client.wait_for(lambda: any(told in message for message in heard))
+    assert set_one(node, "points_voxel", 0.0).successful
+    client.wait_for(lambda: client.clouds)
