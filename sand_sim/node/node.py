@@ -122,11 +122,11 @@ class SandSimNode(LifecycleNode):
 
     def _LifecycleNodeMixin__on_change_state(self, request, response):  # noqa: N802
         """Refuse a transition that is not possible now, where rclpy raises in its service and so ends the node."""
-        possible = self._state_machine.available_transitions
-        numbers = {number: label for number, label, *_ in possible}
-        wanted = request.transition.label or numbers.get(request.transition.id)
-        if wanted not in numbers.values():
-            self.get_logger().warning(f"transition '{request.transition.label or request.transition.id}' is not possible now")
+        asked, machine = request.transition, self._state_machine
+        possible = {number: label for number, label, *_ in machine.available_transitions}
+        if (asked.label or possible.get(asked.id)) not in possible.values():
+            name = asked.label or dict(edge[:2] for edge in machine.transition_graph).get(asked.id, asked.id)
+            self.get_logger().warning(f"transition '{name}' is not possible now; possible are {', '.join(possible.values())}")
             response.success = False
             return response
         return super()._LifecycleNodeMixin__on_change_state(request, response)

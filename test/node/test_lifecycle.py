@@ -12,7 +12,9 @@ pytestmark = pytest.mark.xdist_group("processes")
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from node_client import START
+from rcl_interfaces.msg import Log
 from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from scenes import write_small_scene
 from std_srvs.srv import Trigger
 
@@ -78,6 +80,12 @@ def test_impossible_transitions_are_refused(client, start_node):
     assert state(client) == "active"
     assert client.call(Trigger, "step").success
     assert node.configured
+    heard = []
+    latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    client.node.create_subscription(Log, "/rosout", lambda log: heard.append(log.msg), latched)
+    for label in ("configure", "explode"):
+        told = f"transition '{label}' is not possible now; possible are deactivate, shutdown"
+        client.wait_for(lambda: told in heard)  # noqa: B023
 
 
 def test_frames_that_have_changed_are_looked_at_again(client, start_node):
