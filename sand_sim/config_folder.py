@@ -27,9 +27,10 @@ def find_scene(name: str) -> Path:
     path = Path(name).expanduser()
     if path.is_file():
         return path
-    own = config_folder() / Path(name).name
-    for candidate in (own, own.with_suffix(".yaml")):
-        if candidate.is_file():
-            return candidate
+    own = config_folder() / path.name
+    if path.parent in (Path(), Path("config")):  # else it is a file of the user's that is not there
+        for candidate in (own, own.with_suffix(".yaml")):
+            if candidate.is_file():
+                return candidate
     known = ", ".join(sorted(p.stem for p in config_folder().glob("*.yaml")))
     raise SceneError(f"scene '{name}': there is no such file; the package's own scenes are {known}")

@@ -137,6 +137,9 @@ def test_missing_file_is_refused(tmp_path):
         load_scene(tmp_path / "nothing.yaml")
     with pytest.raises(SceneError, match="the package's own scenes are"):
         find_scene("nothing")
+    with pytest.raises(SceneError, match=r"'typo/dig\.yaml': there is no such file"):
+        find_scene("typo/dig.yaml")
+    assert find_scene("dig") == find_scene("dig.yaml") == find_scene("config/dig.yaml").resolve()
 
 
 def test_orientation_may_be_given_as_roll_pitch_yaw():
