@@ -7,7 +7,7 @@ from sand_sim.border import Health
 
 
 def health_to_diagnostics(
-    health: Health, time: float, name: str, hardware_id: str, further: dict[str, str] | None = None
+    health: Health, time: float, name: str, hardware_id: str, further: dict[str, str] | None = None, state: str = "running"
 ) -> DiagnosticArray:
     """Health of a run to an array with one status: OK, or WARN with the reasons not to trust it.
 
@@ -17,6 +17,7 @@ def health_to_diagnostics(
         name: of the status.
         hardware_id: device the run is on.
         further: more values to show.
+        state: message if nothing speaks against the run.
     """
     values = {
         "time step [s]": f"{health.time_step:.6g}",
@@ -35,7 +36,7 @@ def health_to_diagnostics(
     status = DiagnosticStatus(
         level=DiagnosticStatus.WARN if health.doubts else DiagnosticStatus.OK,
         name=name,
-        message="; ".join(health.doubts) or "running",
+        message="; ".join(health.doubts) or state,
         hardware_id=hardware_id,
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )

@@ -27,7 +27,7 @@ class Interruption:
     def check(self) -> None:
         """Raise ``InterruptedByUserError`` if the user wants to stop."""
         if self.asked:
-            raise InterruptedByUserError
+            raise InterruptedByUserError("interrupted by the user")
 
     def _ask(self, number: int, _) -> None:
         if self.asked:

@@ -49,7 +49,8 @@ class Diagnosis:
             "last rejection": simulation.last_rejection,
         } | {f"commands rejected: {reason}": str(count) for reason, count in rejected.items()}
         device = simulation.world.assembly.solver.device.label
-        message = health_to_diagnostics(last.health, last.time, f"{self._name}: world", device, further)
+        state = "paused" if simulation.paused else "running"
+        message = health_to_diagnostics(last.health, last.time, f"{self._name}: world", device, further, state)
         status, lag = message.status[0], self._lag.look(last.time)
         if lag:
             status.message = lag if status.level == DiagnosticStatus.OK else f"{status.message}; {lag}"

@@ -187,6 +187,24 @@ def test_ctrl_c_ends_a_process_that_waits(start_process, tmp_path):
     assert "Traceback" not in errors
 
 
+def test_ctrl_c_is_told_where_a_client_has_asked_for_the_start(client, start_process, tmp_path):
+    from lifecycle_msgs.msg import Transition
+    from lifecycle_msgs.srv import ChangeState
+
+    write_small_scene(tmp_path, **TOOLS)
+    process = start_process(
+        scene="small.yaml", autostart=False, robot_description_topic="/nobody", robot_description_timeout=1000.0
+    )
+    caller = client.node.create_client(ChangeState, "/sand_sim/change_state")
+    client.wait_for(caller.service_is_ready)
+    caller.call_async(ChangeState.Request(transition=Transition(id=Transition.TRANSITION_CONFIGURE)))
+    client.wait_for(lambda: "sand_sim_listener" in client.node.get_node_names())
+    os.kill(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0
+    assert "cannot be configured: interrupted by the user" in errors
+
+
 def test_configuring_later_waits_in_the_lifecycle_service(client, start_node):
     """The node's own executor is inside the transition while the description is heard."""
     node = start_node(TOOLS, pacing="lockstep", autostart=False, robot_description_topic="/late/robot_description")
