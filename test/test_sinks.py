@@ -253,6 +253,17 @@ def test_a_viewer_may_be_killed_and_come_back(world, monkeypatch):
             end(viewer)
 
 
+def test_a_folder_that_cannot_be_made_is_told_before_the_run(world, tmp_path):
+    told = []
+    (tmp_path / "file").touch()
+    recorder = Recorder(world, output=tmp_path / "file" / "out", report=told.append)
+    assert told == [f"{tmp_path}/file/out cannot be made: Not a directory; summary and history are tried again in the end"]
+    frames(recorder, world, 1)
+    (tmp_path / "file").unlink()
+    assert tmp_path / "file" / "out" / "small.json" in recorder.close()
+    assert not recorder.failed
+
+
 def test_a_history_stays_within_its_bound(tmp_path):
     """Of a run without end rows are thinned out evenly, from its beginning to now."""
     world = World(load_scene(write_small_scene(tmp_path)))

@@ -85,7 +85,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         checkpoints.close()
     files = recorder.close()
     print(f"{scene.name}:\n{summary_text(recorder.log.summarise())}")
-    print("written: " + ", ".join(map(str, files)))
+    print(f"written: {', '.join(map(str, files)) or 'nothing'}")
     if recorder.log.fault:
         print(f"sand_sim: {recorder.log.fault}", file=sys.stderr)
     if recorder.log.fault or recorder.failed:

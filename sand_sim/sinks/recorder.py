@@ -28,7 +28,7 @@ class Recorder:
         output: folder for ``NAME.json``, ``NAME.npz`` and, where matplotlib is installed, ``NAME.png``; None for none.
         view: open the Rerun viewer.
         particles: draw the particles of tools in Rerun.
-        report: called with a line for the user when a sink fails and when it is back.
+        report: called with a line for the user when a sink fails and when it is back, and of other files that cannot be written.
         log: history to go on with, a new one if left out.
 
     Raises:
@@ -55,6 +55,11 @@ class Recorder:
         self._sinks = _open_sinks(world, recording, view, particles, self.log.identity, report) if recording or view else {}
         self._troubled: set[str] = set()
         self._look_after_sinks()
+        try:
+            if output and not (recording and recording.parent == output):  # which tells it itself
+                output.mkdir(parents=True, exist_ok=True)
+        except OSError as error:  # told now, not after hours
+            report(f"{output} cannot be made: {error.strerror or error}; summary and history are tried again in the end")
 
     def write(self, observation: Observation) -> None:
         """Add one observation to all sinks; time zero begins a new history."""
