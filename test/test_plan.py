@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import trimesh
 import yaml
 from kernel_source import source
 from scenes import floor, write_small_scene
@@ -55,6 +56,20 @@ def test_frictionless_kernels_contain_no_code_of_what_was_left_out(make_world):
         return source(build_pair_tiles(world.assembly.recipe)).count("\n")
 
     assert lines(contact={"tangential": "none"}) < 0.7 * lines()
+
+
+def test_what_was_guessed_of_a_mesh_is_told(tmp_path, capsys):
+    scene = write_small_scene(tmp_path)
+    plate = trimesh.load(tmp_path / "plate.stl")
+    main(["plan", str(scene), "--no-measure"])
+    assert "meshes:" not in capsys.readouterr().out
+    plate.update_faces(np.arange(len(plate.faces)) > 1)
+    plate.export(tmp_path / "plate.stl")
+    main(["plan", str(scene), "--no-measure"])
+    lines = capsys.readouterr().out.splitlines()
+    told = lines[lines.index("meshes: what had to be mended or guessed") + 1]
+    assert told.startswith("  tool 'plate' ")
+    assert "holes were closed flat" in told or "taken for sheets" in told
 
 
 def test_smooth_tools_are_left_out_where_all_are_rough(tmp_path):
