@@ -6,10 +6,10 @@ from sand_sim import rotation
 from sand_sim.scene.fields import Field
 from sand_sim.scene.types import Pose
 
-_WHOLE_TURN = 2.0 * math.pi
+_WIDEST = 6.3  # [rad] a whole turn, however it is rounded
 
 
-def read_pose(entry: Field, widest: float = _WHOLE_TURN) -> Pose:
+def read_pose(entry: Field, widest: float = _WIDEST) -> Pose:
     """A pose from ``position`` [m] and ``orientation`` (x y z w) or ``rpy`` [rad], of angles up to the widest [rad]."""
     entry.keys(("position", "orientation", "rpy"))
     position = entry.optional("position", Field.vector, (0.0, 0.0, 0.0))
