@@ -30,6 +30,7 @@ def _run(options: argparse.Namespace) -> int:
     from sampler.cache import sample_file
     from sampler.distance import SignedDistance
     from sampler.location import locate_mesh
+    from sampler.options import check_weight
     from sampler.quiet import start_warp
     from sampler.reading import read_mesh
     from sampler.report import report_table
@@ -38,6 +39,9 @@ def _run(options: argparse.Namespace) -> int:
     start_warp()
     signal.signal(signal.SIGINT, signal.default_int_handler)
     begin = time.perf_counter()
+    weighed = (options.density, options.mass) != (None, None)
+    if weighed:
+        check_weight(options.density, options.mass)
     path = locate_mesh(options.mesh)
     for written in (options.output, options.rrd):
         if written and not written.parent.is_dir():
@@ -62,7 +66,6 @@ def _run(options: argparse.Namespace) -> int:
     )
     bar.end()
     sampled = time.perf_counter()
-    mass = body.mass_properties(options.density, options.mass) if (options.density, options.mass) != (None, None) else None
     seconds = {"sampling": sampled - begin}
     if recording:
         distance = SignedDistance(read_mesh(path, options.scale), options.device, options.thickness or 2.0 * options.radius)
@@ -70,6 +73,7 @@ def _run(options: argparse.Namespace) -> int:
         seconds["recording"] = time.perf_counter() - sampled
     if options.output:
         save_body(options.output, body)
+    mass = body.mass_properties(options.density, options.mass) if weighed and body.volume > 0.0 else None
     print(report_table(body, mass, seconds))
     for written in (options.output, options.rrd):
         if written:

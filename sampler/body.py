@@ -6,7 +6,7 @@ import numpy as np
 
 from sampler.errors import MeshError
 from sampler.mass import MassProperties, principal_axes
-from sampler.options import is_positive
+from sampler.options import check_weight
 
 
 @dataclass(frozen=True)
@@ -94,9 +94,7 @@ class ParticleBody:
         Raises:
             MeshError: if the volume is unknown, or not exactly one positive number is given.
         """
-        given = [value for value in (density, mass) if value is not None]
-        if len(given) != 1 or not is_positive(given[0]):
-            raise MeshError("give either a density [kg/m^3] or a mass [kg], positive")
+        check_weight(density, mass)
         if not np.isfinite(self.volume):
             raise MeshError("the mesh has no sound volume, so mass and inertia cannot be told; give them by hand")
         density = mass / self.volume if density is None else density

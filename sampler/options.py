@@ -13,6 +13,17 @@ def is_positive(value: object) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool) and bool(np.isfinite(value)) and value > 0.0
 
 
+def check_weight(density: float | None, mass: float | None) -> None:
+    """See that exactly one of a density [kg/m^3] and a mass [kg] is given.
+
+    Raises:
+        MeshError: if not, or it is not positive and finite.
+    """
+    given = [value for value in (density, mass) if value is not None]
+    if len(given) != 1 or not is_positive(given[0]):
+        raise MeshError("give either a density [kg/m^3] or a mass [kg], positive")
+
+
 def check_options(lengths: dict[str, float | None], count: int | None, seed: int, device: str) -> None:
     """See that numbers make sense.
 

@@ -122,17 +122,29 @@ def test_command_line(tmp_path):
         ([BUCKET, "--radius", -1], "particle radius must be positive"),
         ([BUCKET, "--radius", 0.01, "--count", 10, "--spacing", 0.1], "either the spacing or the count"),
         ([BUCKET, "--radius", 0.002, "--count", 300, "--grain", 0.001], "could pass"),
-        ([BUCKET, "--radius", 0.01, "--density", 0, "--no-cache"], "a density [kg/m^3] or a mass [kg], positive"),
+        ([BUCKET, "--radius", 0.01, "--density", 0], "a density [kg/m^3] or a mass [kg], positive"),
         ([BUCKET, "--radius", 0.01, "-o", "nowhere/bucket.npz"], "cannot write nowhere/bucket.npz: there is no folder nowhere"),
         ([BUCKET, "--radius", 0.01, "-o", "."], "cannot write .: it is a folder"),
     ],
 )
-def test_command_line_refuses_with_one_line(arguments, reason):
+def test_command_line_refuses_with_one_line_before_the_work(folder, arguments, reason):
     done = run(*arguments)
     assert done.returncode == 1
+    assert not folder.exists()
     (line,) = done.stderr.splitlines()
     assert line.startswith("error: ")
     assert reason in line
+
+
+def test_a_body_without_a_volume_is_written_all_the_same(tmp_path):
+    flat = trimesh.creation.box((0.1, 0.1, 1e-9))
+    flat.update_faces([True, False, *[True] * 10])
+    flat.export(tmp_path / "flat.obj")
+    done = run(tmp_path / "flat.obj", "--radius", 0.005, "--density", 7800, "-o", tmp_path / "flat.npz")
+    assert done.returncode == 0, done.stderr
+    assert "encloses no sound volume; mass and inertia must be given by hand" in done.stdout
+    assert "kg" not in done.stdout
+    assert len(load_body(tmp_path / "flat.npz")) > 0
 
 
 def test_ctrl_c_while_modules_are_imported_is_no_error(tmp_path):
