@@ -12,6 +12,7 @@ rclpy = pytest.importorskip("rclpy", reason="needs ROS 2")
 
 import interface_builder
 from node_client import Client
+from processes import kill
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from scenes import write_small_scene
@@ -93,6 +94,4 @@ def start_process(tmp_path):
 
     yield start
     for process in running:
-        if process.poll() is None:
-            process.kill()
-        process.communicate()
+        kill(process)

@@ -12,6 +12,7 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 pytestmark = pytest.mark.xdist_group("processes")
 
 from node_client import PATIENCE, START, Client, drive
+from processes import kill
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
@@ -162,10 +163,10 @@ def test_a_killed_node_goes_on_from_its_checkpoint(start_process, ros, tmp_path)
             drive(client, scene, begin, kill_at or 0.4)
             if kill_at:
                 time.sleep(0.3)
-                process.kill()
+                kill(process)
             else:
                 process.send_signal(signal.SIGINT)
-            process.communicate(timeout=PATIENCE)
+                process.communicate(timeout=PATIENCE)
         finally:
             client.close()
         return begin, {stamp_to_time(m.header.stamp): np.concatenate(wrench_to_arrays(m)) for m in client.wrenches}

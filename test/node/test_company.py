@@ -4,7 +4,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
@@ -13,6 +12,7 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 pytestmark = pytest.mark.xdist_group("processes")
 
 from node_client import PATIENCE, START, Client
+from processes import kill, shared_memory
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from scenes import write_small_scene
@@ -47,8 +47,7 @@ def test_readers_that_sleep_or_are_killed_do_not_hold_it_up(client, start_node, 
         client.wait_for(lambda: node.simulation.world.time > before + 0.5)
         client.wait_for(lambda: len(client.clouds) > heard + 5)
     finally:
-        reader.kill()
-        reader.communicate()
+        kill(reader)
     before, heard = node.simulation.world.time, len(client.clouds)
     client.wait_for(lambda: node.simulation.world.time > before + 0.5)
     client.wait_for(lambda: len(client.clouds) > heard + 5)
@@ -119,12 +118,11 @@ def test_twenty_starts_in_a_row(start_process, tmp_path):
         process = start_process(scene="small.yaml", pacing="fast")
         while "is ready" not in process.stderr.readline():
             assert process.poll() is None
-        mapped = Path(f"/proc/{process.pid}/maps").read_text().split()
-        own = {path for path in mapped if path.startswith("/dev/shm/fastrtps_") and "port" not in path}
+        own = shared_memory(process)
         assert own
         time.sleep(0.05 * number)
         process.send_signal(signal.SIGINT if number % 2 else signal.SIGTERM)
         _, errors = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0, errors
         assert "Traceback" not in errors
-        assert not [path for path in own if Path(path).exists()], "shared memory is left"
+        assert not [segment for segment in own if segment.exists()], "shared memory is left"

@@ -12,6 +12,7 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 pytestmark = pytest.mark.xdist_group("processes")
 
 from node_client import PATIENCE
+from processes import kill
 from scenes import write_small_scene
 
 from sand_sim.playing import commands_at
@@ -29,9 +30,7 @@ def play(tmp_path):
 
     yield start
     for process in started:
-        if process.poll() is None:
-            process.kill()
-        process.communicate()
+        kill(process)
 
 
 def finish(process):
