@@ -48,6 +48,8 @@ class _File:
         self._buffer = cache(self._read_buffer)
         text = data
         if data[:4] == b"glTF":
+            if len(data) < 12 or struct.unpack_from("<I", data, 8)[0] > len(data):
+                raise self._refusal("is cut off: its header promises more bytes than it holds; copy or export it again")
             chunks, at = {}, 12
             while at + 8 <= len(data):
                 length, kind = struct.unpack_from("<I4s", data, at)

@@ -5,6 +5,7 @@ import re
 import numpy as np
 
 from sampler.caps import span_loop
+from sampler.errors import MeshError
 from sampler.polygons import are_hollow
 
 _MARK = b"\xef\xbb\xbf"  # of UTF-8, which some editors put first
@@ -14,15 +15,26 @@ _VERTEX = re.compile(rb"\nv +(\S+) +(\S+) +(\S+)")
 _ODD = re.compile(rb"\n(?:[ \t]+[vf]|[vf]n?\t|f[^\n-]*-)")  # indented, followed by a tab, counted backwards
 
 
-def bare_obj(data: bytes) -> bytes:
+def bare_obj(name: str, data: bytes) -> bytes:
     """Write an OBJ file plainly and without textures and normals.
 
     Nobody looks at them, and trimesh takes one for a vertex where not all corners of a face have as many.
+
+    Args:
+        name: of the file.
+        data: what it holds.
+
+    Raises:
+        MeshError: if it is binary, cut off within a vertex, or has a face that makes no sense.
     """
-    return _BESIDE.sub(b"", plain_obj(data))
+    if b"\0" in data:
+        raise MeshError(f"mesh {name}: is no OBJ file but binary; give it the ending of its format, as .stl")
+    data = _plain(data)
+    _check(name, data)
+    return _BESIDE.sub(b"", data)
 
 
-def plain_obj(data: bytes) -> bytes:
+def _plain(data: bytes) -> bytes:
     """Write the vertices and faces of an OBJ file anew where trimesh would not read them, or read others than are meant.
 
     Indices below zero count back from their line; trimesh counts them back from the end of the file.
@@ -48,6 +60,24 @@ def plain_obj(data: bytes) -> bytes:
             continue
         lines.append(b" ".join([keyword, *words]))
     return _without_hollow_polygons(b"\n".join([*lines, b""]))
+
+
+def _check(name: str, data: bytes) -> None:
+    """Readers drop faces they do not understand; a body with faces dropped would be wrong in silence."""
+    vertices = data.count(b"\nv ")
+    for match in re.finditer(rb"\nf(?![^ \r\n])([^\r\n]*)", data):
+        corners = match.group(1).split()
+        try:
+            indices = [int(corner.split(b"/")[0]) for corner in corners]
+        except ValueError:
+            indices = [0] * len(corners)
+        if len(indices) < 3 or min(indices) < 1 or max(indices) > vertices:
+            shown = match.group(0).decode(errors="replace").strip()
+            reason = "has too few corners" if len(indices) < 3 else f"refers to a vertex that is not among the {vertices}"
+            raise MeshError(f"mesh {name}: is corrupt: the face '{shown}' {reason}; export it again")
+    last = data.rstrip().rsplit(b"\n", 1)[-1].split()
+    if last and last[0] == b"v" and len(last) < 4:
+        raise MeshError(f"mesh {name}: is cut off in the middle of its last vertex; copy or export it again")
 
 
 def _without_hollow_polygons(data: bytes) -> bytes:

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from sampler.checking import check_file
 from sampler.dae import plain_dae
 from sampler.errors import MeshError
 from sampler.gltf import read_gltf
@@ -23,6 +22,7 @@ from sampler.threemf import read_3mf
 # What trimesh says of damage, with a traceback, of normals that nobody looks at too; what matters is told in one line here.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
+_POINTER = b"version https://git-lfs"
 _OWN = {"stl": read_stl, "ply": read_ply, "off": read_off, "3mf": read_3mf}
 _LETTERS = bytes(range(128)) + 128 * b"?"
 _WITH_UNIT = ("dae", "zae")  # files whose unit trimesh tells
@@ -44,9 +44,9 @@ def read_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
     path = Path(path)
     if not is_positive(scale):
         raise MeshError(f"mesh {path.name}: scale must be positive, got {scale!r}")
-    check_file(path)
+    data = _read(path)
     try:
-        mesh = _load(path)
+        mesh = _load(path, data)
     except MeshError:
         raise
     except ModuleNotFoundError as error:
@@ -80,9 +80,24 @@ def check_mesh(mesh: trimesh.Trimesh, name: str = "mesh") -> trimesh.Trimesh:
     return mesh
 
 
-def _load(path: Path) -> trimesh.Trimesh:
+def _read(path: Path) -> bytes:
+    """What a file holds, if that can be a mesh at all."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise MeshError(f"mesh {path.name}: cannot be read: {error.strerror}") from None
+    if data.startswith(_POINTER):
+        raise MeshError(f"mesh {path.name}: is a Git LFS pointer, not a mesh; run 'git lfs pull' where it comes from")
+    if not data.strip(b"\0 \r\n\t"):
+        raise MeshError(f"mesh {path.name}: is empty")
+    if not path.suffix:
+        raise MeshError(f"mesh {path.name}: has no ending that tells its format, as .stl or .obj; rename it")
+    return data
+
+
+def _load(path: Path, data: bytes) -> trimesh.Trimesh:
     """Everything that trimesh finds in a file, in one mesh, in metres where the file says what its unit is."""
-    kind, data = path.suffix[1:].lower(), path.read_bytes()
+    kind = path.suffix[1:].lower()
     if own := _OWN.get(kind):
         return own(path.name, data)
     if kind in ("gltf", "glb"):
@@ -112,5 +127,5 @@ def _load_scene(path: Path, kind: str, data: bytes) -> trimesh.Scene:
         data = plain_dae(path.name, data)
         return trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False, ignore_broken=False)
     if kind == "obj":  # names may be in any encoding
-        return trimesh.load_scene(io.BytesIO(bare_obj(data).translate(_LETTERS)), file_type=kind, process=False)
+        return trimesh.load_scene(io.BytesIO(bare_obj(path.name, data).translate(_LETTERS)), file_type=kind, process=False)
     return trimesh.load_scene(path, process=False)
