@@ -4,6 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from sampler.topology import merge_points
+
 _STARTS = 150  # places to climb from
 _CELL = 0.5  # of those with the same particle nearest one in each cell of so many spacings, so that they lie in many gaps
 _KNOWN = 20  # the worst places among which they are chosen, per start
@@ -38,8 +40,8 @@ def climb(
     known = min(_KNOWN * _STARTS, len(points))
     order = np.argpartition(-way, known - 1)[:known]
     order = order[np.argsort(-way[order], kind="stable")]
-    cell = np.floor(points[order] / (_CELL * spacing))
-    first = np.unique(np.column_stack([which[order], cell]), axis=0, return_index=True)[1]
+    cell = merge_points(np.floor(points[order] / (_CELL * spacing)))
+    first = np.unique(which[order].astype(np.int64) * known + cell, return_index=True)[1]
     chosen = order[np.sort(first)[:_STARTS]]
     points, normals, way = points[chosen], normals[chosen], way[chosen]
     for step in _FIRST * _SHORTER ** np.arange(steps):

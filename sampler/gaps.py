@@ -43,8 +43,9 @@ class Places:
     fixed: np.ndarray
 
     def at(self, which: np.ndarray) -> "Places":
-        """Some of them."""
-        return Places(*(values[which] for values in vars(self).values()))
+        """Some of them, true in a mask."""
+        chosen = np.flatnonzero(which)
+        return Places(*(values.take(chosen, axis=0) for values in vars(self).values()))
 
     def joined(self, other: "Places") -> "Places":
         """These and others."""
@@ -153,16 +154,16 @@ class Gaps:
 
     def _seek(self, random: np.random.Generator) -> None:
         """Look at the worst places near the worst ones known, too."""
-        places, beside = self.places, partial(self.beside, random=random)
+        places, beside, worst = self.places, partial(self.beside, random=random), []
         for along, found in enumerate((places.closest, places.own)):
             known = places.points, places.normals, found
-            worst = climb(*known, beside, lambda *at, k=along: self.measure(*at)[k]["way"], _STEPS, self.spacing)
-            self.add(*worst[:2])
+            worst.append(climb(*known, beside, lambda *at, k=along: self.measure(*at)[k]["way"], _STEPS, self.spacing)[:2])
+        self.add(*map(np.concatenate, zip(*worst, strict=True)))
 
     def _places_beside(self, which: np.ndarray):
         """Yield each of some particles and the numbers of the places beside it, if there are any."""
         points = self.places.points
-        axis = int(np.ptp(self.skin.triangles, axis=(0, 1)).argmax())
+        axis = int(np.ptp(self.points, axis=0).argmax())
         order = np.argsort(points[:, axis], kind="stable") if len(which) else which
         here, reach = self.points[which, axis], _BESIDE[1] * self.spacing
         first, last = (np.searchsorted(points[order, axis], x) for x in (here - reach, here + reach))
@@ -200,9 +201,10 @@ class Gaps:
         room, chosen, narrow = np.minimum(free, self.places.own["way"]), gaps.copy(), np.flatnonzero(free[gaps] < _ROOM)
         roomy = np.flatnonzero(room > _LEAST)
         roomy = roomy[_near_cells(points[roomy], points[gaps[narrow]], _NEAR * self.spacing)]
+        around = points[roomy]
         for n in narrow:
-            near = np.linalg.norm(points[roomy] - points[gaps[n]], axis=1) < _NEAR * self.spacing
-            near = roomy[near & (normals[roomy] @ normals[gaps[n]] > 0.5)]
+            near = roomy[np.linalg.norm(around - points[gaps[n]], axis=1) < _NEAR * self.spacing]
+            near = near[normals[near] @ normals[gaps[n]] > 0.5]
             if len(near):
                 chosen[n] = near[room[near].argmax()]
         return chosen
@@ -229,8 +231,10 @@ def _near_cells(points: np.ndarray, others: np.ndarray, cell: float) -> np.ndarr
     """Whether points, shape (n, 3) [m], lie in cells of a grid, so wide [m], that others lie in, or beside them; shape (n,)."""
     if not len(points) or not len(others):
         return np.zeros(len(points), bool)
-    low = np.minimum(points.min(axis=0), others.min(axis=0)) - 2.0 * cell
-    size = ((np.maximum(points.max(axis=0), others.max(axis=0)) - low) / cell).astype(np.int64) + 3
+    columns = list(zip(points.T, others.T, strict=True))  # one after another: NumPy is slow along an axis of three
+    low = np.array([min(a.min(), b.min()) for a, b in columns]) - 2.0 * cell
+    high = np.array([max(a.max(), b.max()) for a, b in columns])
+    size = ((high - low) / cell).astype(np.int64) + 3
     where, around = (np.ravel_multi_index(((x - low) / cell).astype(np.int64).T, size) for x in (points, others))
     steps = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ [size[1] * size[2], size[2], 1]
     return np.isin(where, np.unique(around)[:, None] + steps)

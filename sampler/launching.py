@@ -14,7 +14,6 @@ _TOGETHER = 2000  # items below which a second core is not worth its start
 def launch_shares(kernel, number: int, inputs: list, outputs: list, device: str) -> None:
     """Launch a kernel whose argument before the outputs is its first item; on a CPU each core takes a share of the items."""
     cores = len(os.sched_getaffinity(0)) if str(device) == "cpu" and number >= _TOGETHER else 1
-    cuts = np.linspace(0, number, 4 * cores + 1 if cores > 1 else 2).astype(int)
 
     def run(first, last):
         wp.launch(kernel, dim=int(last - first), inputs=[*inputs, int(first), *outputs], device=device)
@@ -25,7 +24,7 @@ def launch_shares(kernel, number: int, inputs: list, outputs: list, device: str)
         return
     shares = []
     try:
-        for ends in pairwise(cuts):
+        for ends in pairwise(np.linspace(0, number, 4 * cores + 1).astype(int)):
             shares.append(_pool(cores).submit(run, *ends))
         for share in shares:
             share.result()

@@ -80,7 +80,7 @@ class Skin(Surface):
         at = (np.arange(number) + random.random(number)) / number * share[-1]
         face = np.minimum(np.searchsorted(share, at), len(share) - 1)
         u = random.random((number, 2))
-        u = np.where(u.sum(axis=1, keepdims=True) > 1.0, 1.0 - u, u)
+        u = np.where(u[:, :1] + u[:, 1:] > 1.0, 1.0 - u, u)
         corner = self.triangles[face]
         points = corner[:, 0] + u[:, :1] * (corner[:, 1] - corner[:, 0]) + u[:, 1:] * (corner[:, 2] - corner[:, 0])
         return points, self.normals[face]
