@@ -15,6 +15,7 @@ from sand_sim.engine.lattice import Lattice
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.tool_body import ToolBody
 from sand_sim.grain_table import GrainTable
+from sand_sim.playing import check_trajectory
 from sand_sim.precision import PRECISIONS, Precision
 from sand_sim.scene.checking import check_scene
 from sand_sim.scene.filling import fill_grains, smallest_sphere
@@ -121,6 +122,8 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     check_scene(scene)  # again: ``dataclasses.replace`` may have changed it since it was read
     finest = smallest_sphere(scene.fills) if scene.tools or scene.bodies else None
     tools = [model_tool(tool, scene, finest, progress) for tool in scene.tools]
+    for model in tools:
+        check_trajectory(model.tool, model.extent, 1.0 / scene.frame_rate)
     grounds = [
         model_ground(one, scene.folder, lambda share, name=one.name: progress(f"sampling {name}", share))
         for one in scene.boundaries

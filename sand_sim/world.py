@@ -4,7 +4,6 @@ from dataclasses import astuple, replace
 
 import numpy as np
 
-from sand_sim import rotation
 from sand_sim.assemble import Assembly, assemble
 from sand_sim.beforehand import find_coarseness, find_fine_surfaces, find_overlap
 from sand_sim.border import CommandError, GrainContacts, Health, Observation, ToolContacts, ToolPose, ToolVelocity
@@ -31,10 +30,9 @@ from sand_sim.scene_identity import describe_scene
 from sand_sim.settling import settle, strike_off
 from sand_sim.sweeping import SweptGround
 from sand_sim.tool_model import Progress, ToolModel
-from sand_sim.track import Track
+from sand_sim.track import SPEED_TOLERANCE, Track, travel
 from sand_sim.trust import BLOWN_UP, GAINED, gained_share
 
-_SPEED_TOLERANCE = 1.02
 _FEWEST_BETWEEN = 100  # steps between two states that are kept, so that keeping them stays below 3 % of the time
 
 
@@ -144,7 +142,7 @@ class World(Changeable):
         end = max(soonest, now + self.time_step) if command.time is None else command.time
         begin_position, begin_orientation = track.at(begin)
         speed = (soonest - begin) / (end - begin) * fastest
-        if speed > fastest * _SPEED_TOLERANCE:
+        if speed > fastest * SPEED_TOLERANCE:
             raise CommandError(
                 "too_fast",
                 f"{tool} would move at {speed:.3g} m/s, its max_speed is {fastest:.3g} m/s; "
@@ -157,9 +155,7 @@ class World(Changeable):
     def travel(self, command: ToolPose) -> float:
         """How far any point of the tool moves at most on its way from where it is to the commanded pose [m]."""
         index = self._tool_index[command.tool]
-        position, orientation = self._tracks[index].at(self.time)
-        turn = rotation.to_vector(rotation.multiply(command.orientation, rotation.inverse(orientation)))
-        return float(np.linalg.norm(command.position - position) + np.linalg.norm(turn) * self.tools[index].extent)
+        return travel(self._tracks[index].at(self.time), (command.position, command.orientation), self.tools[index].extent)
 
     def arrival(self, tool: str) -> float:
         """When a tool reaches, or has reached, its last commanded pose [s]."""

@@ -222,7 +222,7 @@ def test_paths_order_of_keys_and_what_a_run_may_change_do_not_count(written, sce
     turned["pairs"] = [{**rule, "between": rule["between"][::-1]} for rule in reversed(turned["pairs"])]
     turned |= {"name": "renamed", "duration": 3.0, "solver": {"threads": 2}}
     turned["tools"]["plate"] |= {"mesh": "elsewhere.stl"}
-    turned["tools"]["plate"]["trajectory"][-1]["position"] = [0.1, 0.1, 0.1]
+    turned["tools"]["plate"]["trajectory"][-1]["position"] = [0.05, 0.05, 0.05]
     (tmp_path / "elsewhere.stl").write_bytes((scene_path.parent / "plate.stl").read_bytes())
     (tmp_path / "bed.npz").write_bytes((scene_path.parent / "bed.npz").read_bytes())
     path = tmp_path / "turned.yaml"

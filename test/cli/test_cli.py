@@ -38,6 +38,12 @@ def test_help(tmp_path, words):
     assert "usage: sand_sim" in output
 
 
+def test_help_without_docstrings(tmp_path):
+    code, output, errors = finish(sand_sim(tmp_path, "run", "--help", env=os.environ | {"PYTHONOPTIMIZE": "2"}))
+    assert code == 0, errors
+    assert "--resume" in output
+
+
 def test_version(tmp_path):
     code, output, _ = finish(sand_sim(tmp_path, "--version"))
     assert code == 0
@@ -103,14 +109,18 @@ def test_numbers_without_sense_are_refused(tmp_path, words, told):
     assert errors.strip().splitlines()[-1] == f"sand_sim run: error: {told}"
 
 
-def test_a_trajectory_that_is_too_fast_ends_the_run_with_what_it_has(tmp_path):
+def test_a_trajectory_that_is_too_fast_is_told_before_the_run(tmp_path):
     scene = write_small_scene(tmp_path)
-    scene.write_text(scene.read_text().replace("max_speed: 1.0", "max_speed: 0.2"))
-    code, output, errors = finish(sand_sim(tmp_path, "run", scene, "--out", "results"))
-    assert code == 1
-    assert "Traceback" not in errors
-    assert errors.strip().splitlines()[-1].startswith("sand_sim: tool 'plate' would move at 0.265 m/s, its max_speed is 0.2 m/s")
-    assert "written: results/small.rrd" in output
+    good = scene.read_text()
+    for old, new, told in [
+        ("max_speed: 1.0", "max_speed: 0.2", "trajectory[2]: on the way there a point of the tool moves at 0.265 m/s, faster"),
+        ("max_speed: 1.0", "max_speed: 1.0\n    pose: {position: [0, 0, 0.1]}", "pose: is 0.0474 m from where the trajectory"),
+    ]:
+        scene.write_text(good.replace(old, new))
+        code, _, errors = finish(sand_sim(tmp_path, "run", scene, "--out", "results"))
+        assert code == 1
+        assert errors.strip().splitlines()[-1].startswith(f"sand_sim: tools.plate.{told}")
+    assert not (tmp_path / "results").exists()
 
 
 def test_ctrl_c_keeps_what_was_recorded(tmp_path):
