@@ -70,17 +70,18 @@ def load_scene(path: str | Path) -> Scene:
         told = " ".join(str(error).split()).replace('in "<unicode string>", ', "in ")  # the file is named before it
         raise SceneError(f"{path}: is not valid YAML: {told}") from None
     try:
-        return read_scene(parsed, path.resolve().parent)
+        return read_scene(parsed, path.resolve().parent, path.stem)
     except SceneError as error:
         raise SceneError(f"{path}: {error}") from None
 
 
-def read_scene(parsed: dict, folder: Path) -> Scene:
+def read_scene(parsed: dict, folder: Path, name: str = "scene") -> Scene:
     """Turn the content of a scene file into a checked ``Scene``.
 
     Args:
         parsed: mapping as YAML gives it.
         folder: where relative paths start.
+        name: of the scene, and so of the files of its runs, where ``parsed`` has none.
 
     Raises:
         SceneError: if a field is wrong.
@@ -108,7 +109,7 @@ def read_scene(parsed: dict, folder: Path) -> Scene:
     tools = tuple(_tool(name, entry) for name, entry in top["tools"].items()) if "tools" in top else ()
     last = max((waypoint.time for tool in tools for waypoint in tool.trajectory), default=0.0)
     scene = Scene(
-        name=top.optional("name", _file_name, "scene"),
+        name=top.optional("name", _file_name, name),
         gravity=top.optional("gravity", Field.vector, (0.0, 0.0, -9.81)),
         domain=top.optional("domain", read_corners, None),
         materials=tuple(_material(name, entry) for name, entry in top["materials"].items()),

@@ -142,6 +142,12 @@ def test_missing_file_is_refused(tmp_path):
     assert find_scene("dig") == find_scene("dig.yaml") == find_scene("config/dig.yaml").resolve()
 
 
+def test_a_scene_without_a_name_has_that_of_its_file(tmp_path):
+    for written, name in (({}, "two buckets"), ({"name": "other"}, "other")):
+        (tmp_path / "two buckets.yaml").write_text(yaml.safe_dump(GOOD | written))
+        assert load_scene(tmp_path / "two buckets.yaml").name == name
+
+
 def test_orientation_may_be_given_as_roll_pitch_yaw():
     tool = GOOD["tools"]["spade"] | {"pose": {"rpy": [0.0, 0.0, np.pi / 2]}}
     scene = read_scene(changed(("tools", "spade"), tool), Path.cwd())
