@@ -45,7 +45,8 @@ class ParticleBody:
         thinnest_wall: [m]; infinite where no two skins face away from one another.
         evenness: of the particles.
         steps: what was mended and how often.
-        warnings: what the user should know.
+        warnings: what the user should know of surface and particles.
+        mass_warnings: what the user should know of volume, centre and inertia.
     """
 
     points: np.ndarray
@@ -61,6 +62,7 @@ class ParticleBody:
     evenness: Evenness
     steps: dict[str, int] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    mass_warnings: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.points)

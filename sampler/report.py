@@ -33,7 +33,7 @@ def report_table(body: ParticleBody, mass: MassProperties | None, seconds: dict[
         rows.append(("mass", f"{mass.mass:.6g} kg"))
         rows.append(("principal inertia", " ".join(f"{x:.6g}" for x in mass.principal) + " kg m^2"))
     rows.append(("time", ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())))
-    rows += [("warning", text) for text in body.warnings]
+    rows += [("warning", text) for text in (*body.warnings, *body.mass_warnings)]
     width = max(len(name) for name, _ in rows)
     return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
 

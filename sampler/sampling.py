@@ -122,7 +122,8 @@ def sample_body(
         thinnest_wall=thinnest_wall(around),
         evenness=evenness,
         steps=dict(repaired.report.steps),
-        warnings=(*repaired.report.warnings, *doubts, *uneven),
+        warnings=(*repaired.report.warnings, *uneven),
+        mass_warnings=tuple(doubts),
     )
 
 

@@ -11,6 +11,8 @@ import numpy as np
 from sampler.body import Evenness, ParticleBody
 from sampler.errors import MeshError
 
+_TEXTS = ("warnings", "mass_warnings")
+
 
 def save_body(path: str | Path, body: ParticleBody) -> None:
     """Write a body; a reader or a crash in between finds the old file or none, never half of one.
@@ -19,11 +21,11 @@ def save_body(path: str | Path, body: ParticleBody) -> None:
         MeshError: if the file cannot be written.
     """
     path = Path(path)
-    arrays = {f.name: getattr(body, f.name) for f in fields(body) if f.name not in ("evenness", "steps", "warnings")}
+    arrays = {f.name: getattr(body, f.name) for f in fields(body) if f.name not in ("evenness", "steps", *_TEXTS)}
     arrays["evenness"] = np.array(astuple(body.evenness))
     arrays["step_names"] = np.array(list(body.steps), dtype=np.str_)
     arrays["step_counts"] = np.array(list(body.steps.values()), int)
-    arrays["warnings"] = np.array(body.warnings, dtype=np.str_)
+    arrays |= {name: np.array(getattr(body, name), dtype=np.str_) for name in _TEXTS}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".writing-", suffix=".npz", delete=False) as file:
@@ -52,8 +54,8 @@ def load_body(path: str | Path) -> ParticleBody:
             arrays = {name: file[name] for name in file.files}
         steps = dict(zip(arrays.pop("step_names").tolist(), arrays.pop("step_counts").tolist(), strict=True))
         evenness = Evenness(*arrays.pop("evenness").tolist())
-        warnings = tuple(arrays.pop("warnings").tolist())
+        texts = {name: tuple(arrays.pop(name).tolist()) for name in _TEXTS}
         values = {name: array if array.ndim else float(array) for name, array in arrays.items()}
-        return ParticleBody(**values, evenness=evenness, steps=steps, warnings=warnings)
+        return ParticleBody(**values, evenness=evenness, steps=steps, **texts)
     except (OSError, EOFError, KeyError, ValueError, TypeError, RuntimeError, zipfile.BadZipFile) as error:
         raise MeshError(f"body {path}: cannot be read: {error}") from None

@@ -102,6 +102,22 @@ class Assembly:
         np.maximum.at(extent, table.body[~table.lone], (np.linalg.norm(table.offset, axis=1) + table.radius)[~table.lone])
         return extent
 
+    @property
+    def mesh_warnings(self) -> dict[str, tuple[str, ...]]:
+        """What the sampler had to mend or guess in meshes, by what messages call them; only of those where it had to.
+
+        The mass of what is driven, or never moves, does not matter.
+        """
+        told = {one.label: one.body.warnings for one in (*self.tools, *self.grounds)}
+        told |= {one.label: one.warnings for one in self.bodies}
+        return {label: warnings for label, warnings in told.items() if warnings}
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the user should know before the run."""
+        meshes = [f"{label}: {text}" for label, texts in self.mesh_warnings.items() for text in texts]
+        return [self.time_step.warning, *meshes] if self.time_step.warning else meshes
+
     def safe_step(self, speed: float, depth: float) -> float:
         """The step [s] that would be safe at a top speed [m/s] and an overlap over radius [1]."""
         free = replace(self.light, solver=replace(self.light.solver, time_step=None))

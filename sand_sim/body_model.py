@@ -25,6 +25,7 @@ class BodyModel:
         shape: its spheres in the principal frame.
         mass: [kg].
         gyration: principal moments over the mass, shape (3,) [m^2].
+        warnings: what had to be mended or guessed in the mesh.
     """
 
     body: Body
@@ -32,6 +33,7 @@ class BodyModel:
     shape: Shape
     mass: float
     gyration: np.ndarray
+    warnings: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
@@ -84,7 +86,7 @@ def model_body(body: Body, scene: Scene, grain: float | None, progress) -> BodyM
         SceneError: if a mesh or a file cannot be used.
     """
     density, where = scene.materials[scene.material_index(body.material)].density, f"bodies.{body.name}"
-    mesh = None
+    mesh, warnings = None, ()
     if body.mesh is not None:
         try:
             path, show = locate_mesh(body.mesh, scene.folder), partial(progress, f"sampling {body.name}")
@@ -95,6 +97,7 @@ def model_body(body: Body, scene: Scene, grain: float | None, progress) -> BodyM
             raise SceneError(f"{where}.mesh: {error}") from None
         if not np.isfinite(skin.volume) and body.inertia is None:
             raise SceneError(f"{where}.mesh: is not closed, so it has no mass; close it, or give 'mass' and 'inertia'")
+        warnings = skin.warnings if body.inertia is not None else (*skin.warnings, *skin.mass_warnings)
         radii = np.full(len(skin.points), body.particle_radius)
         inertia = skin.inertia / skin.volume if np.isfinite(skin.volume) else np.eye(3)
         shape = principal_shape(skin.points, radii, skin.volume, skin.centre, inertia)
@@ -105,8 +108,8 @@ def model_body(body: Body, scene: Scene, grain: float | None, progress) -> BodyM
             raise SceneError(f"{where}.spheres: {error}") from None
     if body.inertia is not None:
         shape = shape.with_axes(np.eye(3))
-        return BodyModel(body, mesh, shape, body.mass, np.asarray(body.inertia) / body.mass)
-    return BodyModel(body, mesh, shape, body.mass or density * shape.volume, shape.gyration)
+        return BodyModel(body, mesh, shape, body.mass, np.asarray(body.inertia) / body.mass, warnings)
+    return BodyModel(body, mesh, shape, body.mass or density * shape.volume, shape.gyration, warnings)
 
 
 def _listed(rows: tuple) -> Shape:

@@ -30,7 +30,7 @@ class Plan:
         grains, spheres: numbers.
         kept: stages with when they run.
         tools: by name, whether grains touch their particles (``rough``) or their true surfaces (``smooth``).
-        meshes: what the sampler had to mend or guess in the meshes of tools and terrains, where it had to.
+        meshes: what the sampler had to mend or guess in the meshes of tools, terrains and bodies, where it had to.
         left_out: what is neither compiled nor allocated, with the reason.
         kernels: names of the compiled kernels.
         arrays: bytes by array.
@@ -45,7 +45,7 @@ class Plan:
     spheres: int
     kept: dict[str, str]
     tools: dict[str, str]
-    meshes: dict[str, list[str]]
+    meshes: dict[str, tuple[str, ...]]
     left_out: dict[str, str]
     kernels: list[str]
     arrays: dict[str, int]
@@ -77,7 +77,7 @@ def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
         spheres=spheres,
         kept=kept,
         tools={tool.name: tool.contact for tool in scene.tools},
-        meshes={one.label: list(one.body.warnings) for one in (*assembly.tools, *assembly.grounds) if one.body.warnings},
+        meshes=assembly.mesh_warnings,
         left_out=left_out(assembly),
         kernels=sorted(one.key.rsplit("__", 1)[-1] for one in list_kernels(arrays, solver.stages, solver.device)),
         arrays=sizes,

@@ -13,7 +13,7 @@ from sand_sim.assemble import assemble
 from sand_sim.cli.main import main
 from sand_sim.engine.pair_tiles import build_pair_tiles
 from sand_sim.plan import make_plan
-from sand_sim.scene.reading import read_scene
+from sand_sim.scene.reading import load_scene, read_scene
 from sand_sim.scene.shapes import TETRAHEDRON
 
 
@@ -70,6 +70,18 @@ def test_what_was_guessed_of_a_mesh_is_told(tmp_path, capsys):
     told = lines[lines.index("meshes: what had to be mended or guessed") + 1]
     assert told.startswith("  tool 'plate' ")
     assert "holes were closed flat" in told or "taken for sheets" in told
+
+
+def test_what_is_guessed_of_a_mass_is_told_of_bodies_alone(tmp_path):
+    bars = [trimesh.creation.box(np.roll((0.06, 0.01, 0.01), k)) for k in range(2)]
+    trimesh.util.concatenate(bars).export(tmp_path / "cross.stl")
+    common = {"mesh": "cross.stl", "material": "sand", "particle_radius": 0.003}
+    place = {"pose": {"position": [0.1, 0.1, 0.1]}}
+    heavy = {"mass": 0.1, "inertia": [1e-5, 1e-5, 1e-5], "pose": {"position": [0.1, 0.1, 0.2]}}
+    scene = load_scene(write_small_scene(tmp_path, bodies={"cross": common | place, "given": common | heavy}))
+    assembly = assemble(scene)
+    assert list(assembly.mesh_warnings) == ["body 'cross'"]
+    assert assembly.warnings[-1].startswith("body 'cross': parts of the surface are buried in others; volume and inertia")
 
 
 def test_smooth_tools_are_left_out_where_all_are_rough(tmp_path):

@@ -61,8 +61,8 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         )
     recorder = _open_recorder(world, log, options, console.tell)
     recorder.write(world.observe())
-    if world.assembly.time_step.warning:
-        console.tell(f"warning: {world.assembly.time_step.warning}")
+    for warning in world.assembly.warnings:
+        console.tell(f"warning: {warning}")
     begin = world.time + 0.5 * world.time_step
     for time in (time for time in frame_times(scene, options.duration) if time > begin):
         try:

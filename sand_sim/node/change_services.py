@@ -99,7 +99,8 @@ class ChangeServices:
 
         def act() -> str:
             self._world.set_tool_mesh(tool, str(path), scale)
-            return f"tool '{tool}' has mesh {path.name}"
+            warnings = next(one.body.warnings for one in self._world.tools if one.tool.name == tool)
+            return "; ".join([f"tool '{tool}' has mesh {path.name}", *warnings])
 
         return self._simulation.change(act)
 

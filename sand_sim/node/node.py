@@ -194,8 +194,8 @@ class SandSimNode(LifecycleNode):
         self._endings.callback(self.simulation.stop)  # before what it publishes to goes
         if parameters["resume"]:
             self.simulation.resume()
-        if world.assembly.time_step.warning:
-            self.get_logger().warning(world.assembly.time_step.warning)
+        for warning in world.assembly.warnings:
+            self.get_logger().warning(warning)
         for name, similar in parameters.misspelt().items():
             self.get_logger().warning(f"there is no parameter '{name}'" + (f"; is '{similar}' meant?" if similar else ""))
         self._warn_of_coarse_points(world)

@@ -134,6 +134,12 @@ def test_a_tool_gets_another_mesh(client, start_node, tmp_path):
     good, told = ask(client, "set_tool_mesh", tool="plate", mesh="small_plate.stl")
     assert (good, told) == (True, "tool 'plate' has mesh small_plate.stl")
     assert node.simulation.world.tools[0].mesh.extents == pytest.approx([0.03, 0.03, 0.004])
+    open_box = trimesh.creation.box((0.03, 0.03, 0.004))
+    open_box.update_faces(open_box.face_normals[:, 2] < 0.5)
+    open_box.export(tmp_path / "tray.stl")
+    good, told = ask(client, "set_tool_mesh", tool="plate", mesh="tray.stl")
+    assert good
+    assert "; 1 components are open surfaces; they are taken for sheets" in told
     for arguments, reason in (
         ({"tool": "spade", "mesh": "small_plate.stl"}, "spade"),
         ({"tool": "plate", "mesh": "../../../etc/passwd"}, "argument 'mesh'"),

@@ -1,6 +1,7 @@
 """Parameters: described, ranged, changeable where physics allows, refused with a reason elsewhere."""
 
 import pytest
+import trimesh
 import yaml
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
@@ -113,6 +114,17 @@ def test_parameters_that_nobody_declares_are_named(client, start_node):
         "there is no parameter 'tools.plaet.source'; is 'tools.plate.source' meant?",
         "there is no parameter 'zzz'",
     ]
+
+
+def test_what_was_guessed_of_a_mesh_is_told(client, start_node, tmp_path):
+    heard = []
+    client.node.create_subscription(Log, "/rosout", lambda log: heard.append(log.msg), LATCHED)
+    tray = trimesh.creation.box((0.06, 0.06, 0.004))
+    tray.update_faces(tray.face_normals[:, 2] < 0.5)
+    tray.export(tmp_path / "tray.stl")
+    tools = {"tray": {"mesh": "tray.stl", "material": "steel", "particle_radius": 0.003, "pose": {"position": [0, 0, 0.1]}}}
+    start_node({"tools": tools}, pacing="lockstep")
+    client.wait_for(lambda: any(message.startswith("tool 'tray': 1 components are open surfaces") for message in heard))
 
 
 def test_a_cloud_that_cannot_be_thinned_out_names_the_parameter(client, start_node):

@@ -38,6 +38,15 @@ def test_second_load_is_the_first(box, folder, monkeypatch):
     assert (first.evenness, first.steps, first.warnings) == (second.evenness, second.steps, second.warnings)
 
 
+def test_what_is_doubtful_of_the_mass_is_kept_too(tmp_path, folder):
+    bars = [trimesh.creation.box(np.roll((0.1, 0.02, 0.02), k)) for k in range(2)]
+    trimesh.util.concatenate(bars).export(tmp_path / "cross.stl")
+    first, second = (sample_file(tmp_path / "cross.stl", 0.004) for _ in range(2))
+    assert first.warnings == second.warnings == ()
+    assert first.mass_warnings == second.mass_warnings
+    assert "buried in others" in first.mass_warnings[0]
+
+
 def test_other_content_or_options_are_sampled_anew(box, folder):
     sample_file(box, 0.004)
     sample_file(box, 0.005)

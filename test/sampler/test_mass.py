@@ -54,4 +54,4 @@ def test_cracked_solids_weigh_what_lies_inside_of_them(gap):
     assert body.volume == pytest.approx(ball.volume, rel=0.01)
     assert body.centre == pytest.approx(np.zeros(3), abs=0.005)
     assert body.inertia == pytest.approx(0.4 * ball.volume * np.eye(3), abs=0.03 * 0.4 * ball.volume)
-    assert any("does not close" in warning for warning in body.warnings)
+    assert any("does not close" in warning for warning in body.mass_warnings)

@@ -243,7 +243,7 @@ def test_a_surface_that_crosses_itself_is_covered_and_weighs_all_that_it_enclose
     exact = np.trapezoid(np.abs(z + 0.2) * np.pi * (1.0 - z**2), z)
     body = sample_body(twisted, radius=0.05, count=800)
     assert body.volume == pytest.approx(exact, rel=0.01)
-    assert any("inside out" in warning for warning in body.warnings)
+    assert any("inside out" in warning for warning in body.mass_warnings)
     assert body.area == pytest.approx(twisted.area, rel=0.01)
     before, triangles = body.points + 1e-3 * body.normals, np.asarray(twisted.triangles)
     assert np.mean(solid_angle_inside(triangles, before) | solid_angle_inside(triangles[:, ::-1], before)) < 0.01
