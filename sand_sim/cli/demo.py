@@ -26,6 +26,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb."""
     path = find_scene(options.scene)
     scene = load_scene(path)
+    options.out.mkdir(parents=True, exist_ok=True)  # now, not when all has been done
     parameters = {
         "scene": str(path),
         "pacing": "lockstep",

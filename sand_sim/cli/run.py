@@ -39,6 +39,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb."""
     console = Console()
     scene = load_scene(find_scene(options.scene))
+    options.out.mkdir(parents=True, exist_ok=True)  # now, not when all has been done
     if options.threads:
         scene = replace(scene, solver=replace(scene.solver, threads=options.threads))
 

@@ -151,7 +151,8 @@ def test_refusals(tmp_path):
 def test_files_that_cannot_be_written_do_not_stop_a_run(tmp_path):
     """The simulation goes to its end, each trouble is one line, and the exit code tells."""
     scene = write_small_scene(tmp_path)
-    (tmp_path / "blocked").touch()
+    for kind in ("rrd", "npz", "json", "png"):
+        (tmp_path / "blocked" / f"small.{kind}").mkdir(parents=True)
     process = sand_sim(tmp_path, "run", scene, "--out", "blocked")
     output, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
