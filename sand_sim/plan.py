@@ -1,6 +1,7 @@
 """What a scene keeps and leaves out: stages, arrays, kernels, time step and what a run will cost, before it runs."""
 
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -56,18 +57,19 @@ class Plan:
     duration: float | None
 
 
-def make_plan(assembly: Assembly, measure: bool = True) -> Plan:
+def make_plan(assembly: Assembly, measure: bool = True, check: Callable[[], None] = lambda: None) -> Plan:
     """Plan a scene.
 
     Args:
         assembly: from ``assemble``, before anything runs.
         measure: run a packed sample of grains for a moment to predict the cost.
+        check: called meanwhile; may raise to give up.
     """
     arrays, scene, solver = assembly.solver.arrays, assembly.scene, assembly.solver
     sizes = array_sizes(arrays)
     steps = round(scene.duration / assembly.time_step.value)
     spheres = len(assembly.table)
-    cost = measure_cost(assembly) if measure else None
+    cost = measure_cost(assembly, check) if measure else None
     stages = solver.stages
     kept = {s.name: "when a grain has moved as far as its skin allows" for s in stages.listing}
     kept |= {s.name: "when a tool has moved as far as its skin allows" for s in stages.tool_listing}
@@ -133,7 +135,7 @@ def array_sizes(arrays: DemArrays) -> dict[str, int]:
     return sizes
 
 
-def measure_cost(assembly: Assembly) -> float:
+def measure_cost(assembly: Assembly, check: Callable[[], None] = lambda: None) -> float:
     """Time of one sphere and step [s] in a packed sample with this scene's kernels, on this machine and its threads."""
     table = _packed_sample(assembly)
     lattice = Lattice(table.position.min(axis=0) - 1.0, table.position.max(axis=0) + 1.0, assembly.recipe.precision)
@@ -141,10 +143,11 @@ def measure_cost(assembly: Assembly) -> float:
     recipe: Recipe = replace(assembly.recipe, materials=False)
     device = assembly.solver.device
     sample = DemArrays(recipe, replace(setting, gravity=np.zeros(3)), lattice, table, [], [], assembly.pair_table, device)
-    solver = ExplicitDem(sample, device)
+    solver = ExplicitDem(sample, device, lambda stage, share: check())
     solver.run(1)  # compiles
     state, best = solver.take_state(), np.inf
     for _ in range(_SAMPLE_ROUNDS):
+        check()
         solver.put_state(state)  # before the sample, which nothing holds together, has come apart
         begin = time.perf_counter()
         solver.run(_SAMPLE_STEPS)

@@ -12,6 +12,7 @@ from scenes import floor, write_small_scene
 from sand_sim.assemble import assemble
 from sand_sim.cli.main import main
 from sand_sim.engine.pair_tiles import build_pair_tiles
+from sand_sim.interruption import InterruptedByUserError
 from sand_sim.plan import make_plan
 from sand_sim.scene.reading import load_scene, read_scene
 from sand_sim.scene.shapes import TETRAHEDRON
@@ -56,6 +57,18 @@ def test_frictionless_kernels_contain_no_code_of_what_was_left_out(make_world):
         return source(build_pair_tiles(world.assembly.recipe)).count("\n")
 
     assert lines(contact={"tangential": "none"}) < 0.7 * lines()
+
+
+def test_measuring_can_be_given_up(tmp_path):
+    asked, assembly = [], assemble(load_scene(write_small_scene(tmp_path)))
+
+    def check():
+        asked.append(True)
+        if len(asked) == 3:
+            raise InterruptedByUserError
+
+    with pytest.raises(InterruptedByUserError):
+        make_plan(assembly, check=check)
 
 
 def test_what_was_guessed_of_a_mesh_is_told(tmp_path, capsys):

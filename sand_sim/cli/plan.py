@@ -30,7 +30,8 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         interruption.check()
         console.stage(stage, share)
 
-    plan = make_plan(assemble(load_scene(find_scene(options.scene)), progress), measure=not options.no_measure)
+    assembly = assemble(load_scene(find_scene(options.scene)), progress)
+    plan = make_plan(assembly, measure=not options.no_measure, check=interruption.check)
     console.end()
     print(json.dumps(asdict(plan), indent=2, default=float) if options.json else plan_text(plan))
     return 0
