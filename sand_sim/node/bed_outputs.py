@@ -21,6 +21,7 @@ from sand_sim.world import World
 
 _MOST_WAITING = 5  # as many as are kept for a reader
 _MOST_CELLS = 10_000_000  # of a height map, 40 MB
+_COARSE_POINTS = 0.01  # resolution of points over the smallest radius
 
 
 class BedOutputs:
@@ -112,6 +113,16 @@ class BedOutputs:
     def _publish_heights(self, observation: Observation) -> None:
         heights = make_height_map(observation.spheres, self._low, self._cell, self._shape).heights
         self._heights.publish(heights_to_image(heights, observation.time, self._parameters["frame_id"]))
+
+
+def coarse_points(world: World) -> list[str]:
+    """A warning where points, in the single precision of messages, are coarser than the simulation, as far from the origin."""
+    lattice, smallest = world.assembly.lattice, min(world.assembly.smallest.values())
+    resolution = float(np.spacing(np.float32(np.abs([lattice.low, lattice.high]).max())))
+    if resolution <= _COARSE_POINTS * smallest:
+        return []
+    told = f"this far from the origin ~/points are rounded to {resolution:.2g} m, the simulation is not"
+    return [f"{told}; put the scene nearer to the origin of its frame"]
 
 
 def _grid(world: World, asked: float) -> tuple[np.ndarray, float, tuple[int, int]]:

@@ -19,7 +19,7 @@ from sand_sim.checkpoints import CheckpointFolder
 from sand_sim.config_folder import find_scene
 from sand_sim.courses import StampRules
 from sand_sim.engine.explicit_dem import UnstableError
-from sand_sim.node.bed_outputs import BedOutputs
+from sand_sim.node.bed_outputs import BedOutputs, coarse_points
 from sand_sim.node.change_services import ChangeServices
 from sand_sim.node.connections import Connections
 from sand_sim.node.diagnosis import Diagnosis
@@ -38,7 +38,6 @@ from sand_sim.world import World
 
 _DIAGNOSTICS_PERIOD = 1.0  # [s] wall
 _PROGRESS_PERIOD = 5.0  # [s] wall
-_COARSE_POINTS = 0.01  # resolution of points over the smallest radius
 _DONE, _REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
@@ -144,8 +143,12 @@ class SandSimNode(LifecycleNode):
 
     def hold(self, paused: bool) -> None:
         """Hold stepping or go on; it is also held while the node is inactive."""
-        self._held = paused
-        self.simulation.pause(paused or not self._active)
+        self._held, still = paused, paused or not self._active
+        if still and not self.simulation.paused:
+            self._still_since = time.monotonic()
+        elif self.simulation.paused and not still:
+            self.recorder.log.leave_out(self._still_since)
+        self.simulation.pause(still)
 
     def parameters_changed(self) -> None:
         """Called after parameters have been set."""
@@ -194,11 +197,10 @@ class SandSimNode(LifecycleNode):
         self._endings.callback(self.simulation.stop)  # before what it publishes to goes
         if parameters["resume"]:
             self.simulation.resume()
-        for warning in world.assembly.warnings:
+        for warning in (*world.assembly.warnings, *coarse_points(world)):
             self.get_logger().warning(warning)
         for name, similar in parameters.misspelt().items():
             self.get_logger().warning(f"there is no parameter '{name}'" + (f"; is '{similar}' meant?" if similar else ""))
-        self._warn_of_coarse_points(world)
         self.configured = True
         self.hold(parameters["paused"])
         self.simulation.start()
@@ -275,16 +277,6 @@ class SandSimNode(LifecycleNode):
             self._frame_readers = self._frames.get_subscription_count()
             frames = [tool.frame(observation) for tool in self._tools if not tool.follows]
             self._frames.publish(tf2_msgs.frames_to_message(frames))
-
-    def _warn_of_coarse_points(self, world: World) -> None:
-        """Messages hold points in single precision, which far from the origin is coarser than the simulation."""
-        lattice, smallest = world.assembly.lattice, min(world.assembly.smallest.values())
-        resolution = float(np.spacing(np.float32(np.abs([lattice.low, lattice.high]).max())))
-        if resolution > _COARSE_POINTS * smallest:
-            self.get_logger().warning(
-                f"this far from the origin ~/points are rounded to {resolution:.2g} m, the simulation is not; "
-                "put the scene nearer to the origin of its frame"
-            )
 
     def _complain(self, error: Exception) -> None:
         self.get_logger().error(f"a cloud could not be told: {error}", throttle_duration_sec=10.0)

@@ -59,7 +59,7 @@ class RunLog:
 
     Attributes:
         scene: what is run.
-        started: wall clock at the start [s].
+        started: wall clock at the start [s], later by what was left out.
         rows: values of each frame by name.
         last: the last observation.
         views: the bed at the end of each phase of a trajectory, by the phase's name.
@@ -96,6 +96,10 @@ class RunLog:
         self.rows.append(row | {f"wall.{one.name}.{part}": getattr(one, part) for one in plungers for part in _OF_PLUNGER})
         if len(self.rows) > self.most_rows:
             self.rows, self._every = self.rows[::2], 2 * self._every
+
+    def leave_out(self, since: float) -> None:
+        """Leave the time since a moment of the wall clock [s], in which the run was held, out of what it has taken."""
+        self.started += time.monotonic() - max(since, self.started)
 
     @property
     def _names(self) -> set[str]:

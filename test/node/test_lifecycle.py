@@ -1,6 +1,7 @@
 """Lifecycle: configure, activate, deactivate, clean up, and whatever a client asks in the wrong moment."""
 
 import gc
+import time
 import weakref
 
 import pytest
@@ -158,3 +159,18 @@ def test_a_world_that_is_cleaned_up_goes_with_its_threads(ros, tmp_path):
     finally:
         gc.enable()
         node.destroy_node()
+
+
+def test_time_that_a_run_is_held_is_not_counted(client, start_node):
+    node = start_node()
+    client.wait_for(lambda: client.time > 0.05)
+    log = node.recorder.log
+    for hold, go_on in ((("pause", Trigger), ("resume", Trigger)), (("deactivate", None), ("activate", None))):
+        begin, before = time.monotonic(), log.rows[-1]["wall"]
+        for name, kind in (hold, go_on):
+            assert client.call(kind, name).success if kind else change(client, name)
+            if name == hold[0]:
+                time.sleep(0.5)
+        rows = len(log.rows)
+        client.wait_for(lambda rows=rows: len(log.rows) > rows)
+        assert log.rows[-1]["wall"] - before < time.monotonic() - begin - 0.45
