@@ -16,7 +16,13 @@ def main(arguments: list[str] | None = None) -> int:
     """
     interruption = Interruption()  # before the long imports
     with perhaps_unread():
-        return _execute(arguments, interruption)
+        try:
+            return _execute(arguments, interruption)
+        except BrokenPipeError:
+            raise  # to ``perhaps_unread``
+        except OSError as error:  # of files that cannot be written, also those of kernels while all is imported
+            Console().tell(f"sand_sim: {error}")
+            return 1
     return UNREAD
 
 
@@ -38,9 +44,7 @@ def _execute(arguments: list[str] | None, interruption: Interruption) -> int:
     try:
         interruption.check()
         return options.execute(options, interruption)
-    except BrokenPipeError:
-        raise  # to ``perhaps_unread``
-    except (CheckpointError, SceneError, OSError) as error:  # the last, of files that cannot be written
+    except (CheckpointError, SceneError) as error:
         Console().tell(f"sand_sim: {error}")
         return 1
     except InterruptedByUserError:

@@ -26,11 +26,14 @@ def main(arguments: list[str] | None = None) -> int:
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
-    from sand_sim.node.node import SandSimNode
-    from sand_sim.node.preparing import Preparation
-    from sand_sim.node.transport import enlarge_shared_memory
-    from sand_sim.scene.types import SceneError
-
+    try:
+        from sand_sim.node.node import SandSimNode
+        from sand_sim.node.preparing import Preparation
+        from sand_sim.node.transport import enlarge_shared_memory
+        from sand_sim.scene.types import SceneError
+    except OSError as error:  # of the folder for compiled kernels
+        print(f"sand_sim: {error}", file=sys.stderr)
+        return 1
     enlarge_shared_memory()
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
@@ -51,7 +54,7 @@ def main(arguments: list[str] | None = None) -> int:
         code = 1 if node.configured and node.simulation.fault else 0
     except (InterruptedByUserError, ExternalShutdownException):
         pass
-    except (SceneError, ValueError, ParameterException) as error:
+    except (SceneError, ValueError, OSError, ParameterException) as error:
         print(f"sand_sim: {error}", file=sys.stderr)
         return 1
     finally:

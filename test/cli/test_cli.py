@@ -84,6 +84,19 @@ def test_refusals_are_one_line(tmp_path):
     assert len(errors.strip().splitlines()) == 1
 
 
+@pytest.mark.parametrize("command", [["sand_sim", "run", "dig"], ["sand_sim.node"]])
+def test_a_folder_for_kernels_that_cannot_be_made_is_told(tmp_path, command):
+    if command == ["sand_sim.node"]:
+        pytest.importorskip("rclpy", reason="needs ROS 2")
+    (tmp_path / "file").touch()
+    environment = os.environ | {"WARP_CACHE_PATH": str(tmp_path / "file")}
+    done = subprocess.run([sys.executable, "-m", *command], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("sand_sim: compiled kernels cannot be kept: [Errno 20] Not a directory")
+    assert done.stderr.endswith("; set WARP_CACHE_PATH to a folder that can be written\n")
+    assert len(done.stderr.splitlines()) == 1
+
+
 @pytest.mark.parametrize("words", [["pareto", "impact"], ["stability"], ["demo"], ["run", "dig"]])
 def test_a_folder_that_cannot_be_made_is_refused_at_once(tmp_path, words):
     (tmp_path / "file").touch()
