@@ -1,5 +1,6 @@
 """Sinks that fail: the run goes on, says so once, and takes them up again."""
 
+import json
 import os
 import resource
 import signal
@@ -8,6 +9,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -275,3 +277,17 @@ def test_a_history_stays_within_its_bound(tmp_path):
     assert steps[0] <= 1
     assert steps[-1] >= 1000 - 2 * 1000 / 10
     assert len(set(np.diff(steps))) == 1
+
+
+def test_columns_of_the_history_are_those_that_are_documented(tmp_path):
+    plunger = {"type": "plunger", "name": "press", "material": "steel", "point": [0.0, 0.0, 0.2], "normal": [0.0, 0.0, -1.0]}
+    scene = write_small_scene(tmp_path)
+    scene.write_text(scene.read_text().replace("boundaries:", f"boundaries:\n- {json.dumps(plunger | {'velocity': 0.1})}"))
+    world = World(load_scene(scene))
+    log = RunLog(world.scene)
+    log.write(world.observe())
+    log.save_history(tmp_path / "history.npz")
+    document = (Path(__file__).parents[1] / "docs" / "python.md").read_text(encoding="utf-8")
+    for name in np.load(tmp_path / "history.npz").files:
+        told = name.replace("plate.", "TOOL.").replace("press.", "PLUNGER.")
+        assert f"`{told}`" in document or name.startswith("bed.")

@@ -15,7 +15,7 @@ from sand_sim.track import phases_at, phases_of
 _STILL = 1e-4  # [m/s] horizontal speed below which a tool has no draft
 # What each row holds of the world's health, of every tool, by the attribute of its report, and of every plunger.
 _OF_HEALTH = ("contacts", "deepest", "kinetic", "dissipated", "momentum_residual")
-_OF_TOOL = {"position": "position", "velocity": "velocity", "force": "world_force", "torque": "torque", "carried": "carried"}
+_OF_TOOL = {name: name for name in ("position", "orientation", "velocity", "torque", "carried")} | {"force": "world_force"}
 _OF_PLUNGER = ("position", "force")
 
 
