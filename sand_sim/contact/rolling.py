@@ -52,14 +52,16 @@ def build_spring(precision: Precision, types: ContactTypes) -> wp.Function:
     @wp.func
     def spring(contact: types.contact, pair: types.pair, normal_force: real, memory: vec3):
         rolling = contact.turning - contact.normal * wp.dot(contact.turning, contact.normal)
+        # Moments over the arm, because squares of moments of grains below a micrometre are zero in single precision.
         arm = pair.rolling_friction * contact.radius
-        stiffness = real(2.25) * arm * arm * pair.rolling_young * contact.patch
+        line = real(2.25) * pair.rolling_young * contact.patch
         # 7/5 m r^2 is the inertia of a sphere about its contact point.
-        inertia = real(7.0) / real(5.0) * contact.mass * contact.least * contact.least
-        viscous = rolling * (real(2.0) * real(wp.static(damping)) * wp.sqrt(stiffness * inertia))
+        critical = real(2.0) * contact.least * wp.sqrt(line * (real(7.0) / real(5.0) * contact.mass))
+        viscous = rolling * (real(wp.static(damping)) * critical)
         over = contact.roll - contact.normal * wp.dot(contact.roll, contact.normal)
         rolled = turned(memory, contact.normal) + over * contact.span
-        return bounded(rolled, viscous, stiffness, arm * normal_force)
+        force, held = bounded(rolled, viscous, line * arm, normal_force)
+        return force * arm, held
 
     return spring
 
