@@ -49,7 +49,7 @@ class Assembly:
         tools: in the order of the scene.
         bodies: in the order of the scene.
         grounds: terrains, which the solver has as bodies after the tools.
-        smallest: smallest grain radius of each grain material [m].
+        smallest: smallest sphere that each grain material has, or could have had by chance [m].
         finest: smallest sphere that the fills can bring, none of which passes tools or gets into bodies [m]; None without any.
         time_step: chosen, with its reasons.
         frame_steps: steps per frame.
@@ -155,7 +155,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     ]
     table = GrainTable.join([*fills, *(body.table(order.index(body.body.material)) for body in bodies)])
     device = _open_device(scene, len(table))
-    smallest = {order[k]: float(table.radius[table.material == k].min()) for k in np.unique(table.material)}
+    smallest = _smallest(scene, table, order)
     light = lighten(scene, table, order)
     time_step, frame_steps = _time_step(light, table, smallest, walls, tools, grounds)
     precision = PRECISIONS[scene.solver.precision]
@@ -213,7 +213,7 @@ def build_solver(assembly: Assembly, setting: Setting, device, progress: Progres
         replace(setting, reach=_reach(scene, table, order)),
         assembly.lattice,
         table,
-        make_surfaces(assembly.walls, order, assembly.lattice, float(table.radius.min()), assembly.plungers),
+        make_surfaces(assembly.walls, order, assembly.lattice, min(assembly.smallest.values()), assembly.plungers),
         [_tool_body(tool, order) for tool in assembly.tools]
         + [ToolBody(ground.body.points, ground.body.radius, order.index(ground.material)) for ground in assembly.grounds],
         assembly.pair_table,
@@ -243,6 +243,14 @@ def _tool_body(tool: ToolModel, order: list[str]) -> ToolBody:
 def _loose_materials(scene: Scene) -> set[str]:
     """Names of the materials of everything that moves freely."""
     return {one.material for one in (*scene.fills, *scene.bodies)}
+
+
+def _smallest(scene: Scene, table: GrainTable, order: list[str]) -> dict[str, float]:
+    """Smallest radius of each grain material [m], of fills that draw it the least they may draw, whatever the seed."""
+    drawn = {order[k]: float(table.radius[table.material == k].min()) for k in np.unique(table.material)}
+    fills = [fill for fill in scene.fills if fill.file is None]
+    limits = {name: smallest_sphere(fill for fill in fills if fill.material == name) for name in drawn}
+    return {name: min(radius, limits[name] or radius) for name, radius in drawn.items()}
 
 
 def material_order(scene: Scene) -> list[str]:

@@ -45,8 +45,8 @@ def read_grains(assembly: Assembly, position, radius, material: str | None, velo
     if small.any():
         raise CommandError(
             "too_small",
-            f"radius: {small.sum()} of {number} grains are smaller than {least:.6g} m, the smallest of '{material}' at the "
-            "start, which time step and tools were made for; ask for larger ones, or give the scene a fill with such grains",
+            f"radius: {small.sum()} of {number} grains are smaller than {least:.6g} m, the smallest of '{material}' in the "
+            "scene, which time step and tools were made for; ask for larger ones, or give the scene a fill with such grains",
         )
     outside = ~np.all((position > assembly.lattice.low) & (position < assembly.lattice.high), axis=1)
     if outside.any():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scenes import floor
+from scenes import SceneMaker, floor
 
 from sand_sim import SceneError, World, read_scene
 from sand_sim.scene.time_step import contact_time, rayleigh_time
@@ -127,3 +127,20 @@ def test_softer_springs_leave_the_step_of_hertz_contacts(make_world):
     springs = {"contact": {"rolling": "spring", "twisting": "marshall"}, "numbers": {"rolling_friction": 0.3}}
     further = make_world([0.0, 0.0, 0.005], 0.005, boundaries=floor(), **springs)
     assert further.assembly.time_step.safe == plain.assembly.time_step.safe
+
+
+@pytest.mark.parametrize("size", [{"uniform": [0.002, 0.004]}, {"table": {"radii": [0.002, 0.004], "weights": [1.0, 200.0]}}])
+def test_chance_neither_sets_the_step_nor_what_may_be_added(tmp_path, size):
+    """Three grains hardly ever draw the least radius that they may; whatever the seed, the step is made for it."""
+    steps = []
+    for seed in range(3):
+        content = SceneMaker(tmp_path).scene(
+            [[0.0, 0.0, 0.01]], 0.004, boundaries=floor(), domain={"low": [-0.1] * 3, "high": [0.1] * 3}
+        )
+        region = {"low": [-0.03, -0.03, 0.0], "high": [0.03, 0.03, 0.05]}
+        content["fills"] = [{"material": "grain", "radius": size, "count": 3, "region": region, "seed": seed}]
+        world = World(read_scene(content, tmp_path))
+        assert world.observe().grains.radius.min() > 0.002
+        world.add_grains([[0.0, 0.0, 0.07]], 0.002)
+        steps.append(world.assembly.time_step.rayleigh)
+    assert steps == pytest.approx([rayleigh_time(0.002, Material("grain", 2500.0, 1e7, 0.25))] * 3, rel=1e-12)
