@@ -12,11 +12,11 @@ def work_of_tools(assembly: Assembly) -> np.ndarray:
     The solver has summed it up to the middle of the last step; what is left of that belongs to the force at its end, which is
     known only now.
     """
-    tools, dt = assembly.solver.arrays.tools, assembly.time_step.value
+    tools = assembly.solver.arrays.tools
     if tools is None:
         return np.zeros(0)
-    power = np.einsum("ijk,ijk->i", tools.wrench.numpy(), tools.twist.numpy())
-    return tools.work.numpy() - 0.5 * dt * power * (assembly.recipe.integrator == VERLET)
+    done = np.einsum("ijk,ijk->i", tools.wrench.numpy(), tools.way.numpy())
+    return tools.work.numpy() - 0.5 * done * (assembly.recipe.integrator == VERLET)
 
 
 def work_of_plungers(assembly: Assembly) -> np.ndarray:

@@ -10,6 +10,8 @@ from sand_sim.engine.tool_contacts import SUM_BLOCK
 from sand_sim.engine.tools import ToolTrack, build_tool_state_at, tool_types
 from sand_sim.precision import Precision
 
+_ON_TIME = 1e-6  # of a step: a velocity that changes less than that after the step has begun changes with it
+
 
 @cache
 def build_place_tools(precision: Precision) -> wp.Kernel:
@@ -72,14 +74,20 @@ def sum_impulses(
     wrench: wp.array2d(dtype=wp.vec3d),
     impulse: wp.array2d(dtype=wp.vec3d),
     twist: wp.array2d(dtype=wp.vec3d),
+    way: wp.array2d(dtype=wp.vec3d),
     work: wp.array(dtype=wp.float64),
 ):
     """Impulse of the wrenches over the frame, shape (tools, 2), and work of the tools on the sand since the start.
 
-    The work of a wrench is that over half the step before and half the step after, between which a tool may change its velocity.
-    ``twist`` has shape (tools, 2): velocity of the frame's origin and spin over the step before, then over the step after.
+    The work of a wrench is that over half the way of the step before and half that of the step after. ``way`` has shape (tools,
+    2): of the frame's origin and turn over the step before, then over the step after; ``twist`` the same, velocity and spin.
+
+    A tool that comes to the end of its track within a step is there until the step ends, and makes up for it in the next one if
+    it goes on. Contacts see even motion all the same: a velocity that changes within a step is taken to change at its end, and
+    what that leaves out is added to the velocity over the next step, so that both together are the way.
     """
     time = wp.float64(steps_done[0]) * dt
+    before = wp.float64(steps_done[0] - wp.int64(1)) * dt
     for tool in range(wrench.shape[0]):
         force = wrench[tool, 0]
         torque = wrench[tool, 1]
@@ -88,11 +96,26 @@ def sum_impulses(
         track = tracks[tool]
         velocity = wp.vec3d(wp.float64(0.0))
         spin = wp.vec3d(wp.float64(0.0))
+        moving = wp.float64(0.0)
+        changed = track.end_time
         if time >= track.begin_time and time < track.end_time:
             velocity = track.velocity
             spin = track.spin
-        power = wp.dot(force, twist[tool, 0] + velocity) + wp.dot(torque, twist[tool, 1] + spin)
-        work[tool] = work[tool] - wp.float64(0.5) * power * dt
+            moving = wp.min(track.end_time - time, dt)
+            changed = track.begin_time
+        late = time - changed
+        within = changed > before and late > wp.float64(wp.static(_ON_TIME)) * dt
+        if within:
+            moving += late
+        shift = velocity * moving
+        turn = spin * moving
+        if within:
+            velocity += (velocity - twist[tool, 0]) * (late / dt)
+            spin += (spin - twist[tool, 1]) * (late / dt)
+        done = wp.dot(force, way[tool, 0] + shift) + wp.dot(torque, way[tool, 1] + turn)
+        work[tool] = work[tool] - wp.float64(0.5) * done
+        way[tool, 0] = shift
+        way[tool, 1] = turn
         twist[tool, 0] = velocity
         twist[tool, 1] = spin
 

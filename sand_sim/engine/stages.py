@@ -256,7 +256,7 @@ def finish_stage(arrays: DemArrays, recorder) -> None:
         recorder.once(end_lifetime, watched, wait=False)
     if tools:
         recorder.once(finish.sum_wrenches, [arrays.tool_list.pairs.spans, arrays.wrench_blocks, tools.wrench], wait=False)
-        inputs = [dt, tools.tracks, flags.steps_done, tools.wrench, tools.impulse, tools.twist, tools.work]
+        inputs = [dt, tools.tracks, flags.steps_done, tools.wrench, tools.impulse, tools.twist, tools.way, tools.work]
         recorder.once(finish.sum_impulses, inputs, wait=False)
     if arrays.plungers:
         moved = [arrays.wall_list.pairs.spans, arrays.plunger_blocks, arrays.plungers.drives, arrays.plungers.states]

@@ -81,7 +81,7 @@ def _whole_arrays(arrays: DemArrays) -> dict[str, wp.array]:
         names = ("sphere_at", "place", "remainder", "motion", "half_motion", "motion_carry", "turn", "momentum")
         found |= {f"bodies.{name}": getattr(arrays.bodies, name) for name in names}
     if tools:
-        names = ("tracks", "states", "travelled", "wrench", "impulse", "twist", "work")
+        names = ("tracks", "states", "travelled", "wrench", "impulse", "twist", "way", "work")
         found |= {f"tools.{name}": getattr(tools, name) for name in names}
     if arrays.plungers:
         found |= {f"plungers.{name}": getattr(arrays.plungers, name) for name in ("states", "engaged")}

@@ -39,6 +39,7 @@ class Tools:
         travelled: bound of each tool's motion since the list was made, shape (tools,) [m].
         wrench, impulse: force and torque of the sand now, and over the frame, vec3d, shape (tools, 2).
         twist: velocity of the frame's origin and spin over the last step, world frame, vec3d, shape (tools, 2) [m/s], [rad/s].
+        way: the same of the frame's origin and turn, vec3d, shape (tools, 2) [m], [rad].
         work: of the tool on the sand up to the middle of the last step, shape (tools,) [J].
         smooth: surfaces of the smooth ones; None if there are none.
     """
@@ -84,6 +85,7 @@ class Tools:
         self.wrench = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
         self.impulse = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
         self.twist = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
+        self.way = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
         self.work = wp.zeros(self.number, dtype=wp.float64, device=device)
         surfaces = [body.triangles for body in bodies]
         self.smooth = None
