@@ -60,7 +60,7 @@ def build_pair_contact(recipe: Recipe) -> wp.Function:
     """Warp function that makes a ``Contact`` of two grains, and half the overlap [m] by which their arms are shorter.
 
     It is given the excess, where a is from b and both radii [quantum], the velocity of a relative to b and both spins now and,
-    named past, over the last step, both masses and the quantum [m].
+    named past, over the last step, both masses, the quantum [m] and the step [s].
     """
     precision, rotation = recipe.precision, recipe.rotation
     real, vec3, whole, whole3 = precision.real, precision.vec3, precision.whole, precision.whole3
@@ -82,6 +82,7 @@ def build_pair_contact(recipe: Recipe) -> wp.Function:
         mass_a: real,
         mass_b: real,
         quantum: real,
+        dt: real,
     ):
         span = real(size_a + size_b)
         normal, distance = direction(vec3(real(apart[0]), real(apart[1]), real(apart[2])))
@@ -96,8 +97,9 @@ def build_pair_contact(recipe: Recipe) -> wp.Function:
         mass = mass_a * mass_b / (mass_a + mass_b)
         met = meeting(normal, overlap, slip, spin_a - spin_b, radius, wp.min(radius_a, radius_b), mass)
         if wp.static(halves):
-            drift = past - wp.cross(past_a * (radius_a - half) + past_b * (radius_b - half), normal)
-            met = drifting(met, drift, past_a - past_b)
+            lag = (past - normal * wp.dot(past, normal)) * (real(0.5) * dt / (radius_a + radius_b))
+            drift = past - wp.cross(past_a * (radius_a - half) + past_b * (radius_b - half), normal - lag)
+            met = drifting(met, drift, past_a - past_b, lag)
         return met, half
 
     return pair_contact

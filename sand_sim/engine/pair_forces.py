@@ -84,6 +84,7 @@ def build_pair_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     of_a[3],
                     of_b[3],
                     quantum,
+                    dt,
                 )
                 pair = table[0]
                 if wp.static(materials):

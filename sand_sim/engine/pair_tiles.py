@@ -172,6 +172,7 @@ def build_pair_tiles(recipe: Recipe) -> wp.Kernel:
                     masses_a[k],
                     masses_b[k],
                     quantum,
+                    dt,
                 )
                 if wp.static(materials):
                     pair = table[sure(kinds_of[k])]

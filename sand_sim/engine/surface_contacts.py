@@ -10,7 +10,7 @@ from sand_sim.engine.contact_list import build_note
 from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.plungers import PlungerState
 from sand_sim.engine.prefetch import build_fetch_grain
-from sand_sim.engine.recipe import PLUNGER, ROUGH, SHELL, Recipe
+from sand_sim.engine.recipe import CYLINDER, PLUNGER, ROUGH, SHELL, Recipe
 from sand_sim.engine.roughness import build_columns_near, build_rows_near, build_sphere_at
 from sand_sim.engine.surfaces import KINDS, Surface, build_nearest, build_surface_of
 from sand_sim.precision import Precision
@@ -139,7 +139,7 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     meeting, acts = build_meeting(precision), build_acts(recipe)
     drifting, halves = build_drifting(precision), recipe.halves
     act, release, fetch_grain = *build_act(recipe, measuring), build_fetch_grain(recipe)
-    rough, moving = ROUGH in surfaces, PLUNGER in surfaces
+    rough, moving, curved = ROUGH in surfaces, PLUNGER in surfaces, bool(surfaces & {CYLINDER, SHELL})
 
     @kernel
     def surface_forces(
@@ -218,8 +218,20 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     velocity -= wp.cross(turning, normal) * (radius - share * overlap)
                 met = meeting(normal, overlap, velocity, turning, law_radius, least, mass)
                 if wp.static(halves):
-                    past = half_spin[i]
-                    met = drifting(met, half_motion[i] - of_wall - wp.cross(past, normal) * (radius - share * overlap), past)
+                    past = half_motion[i] - of_wall
+                    turned = half_spin[i]
+                    lag = vec3(real(0.0))
+                    if wp.static(curved):
+                        half_way = past * (real(0.5) * dt / quantum)
+                        before = away - wp.vec3d(wp.float64(half_way[0]), wp.float64(half_way[1]), wp.float64(half_way[2]))
+                        if smooth:
+                            _distance, was = nearest(wall, number, before)
+                            lag = vec3(real(way[0] - was[0]), real(way[1] - was[1]), real(way[2] - was[2]))
+                    if wp.static(rough):
+                        if not smooth:
+                            lag = (past - normal * wp.dot(past, normal)) * (real(0.5) * dt / (radius + real(wall.ball) * quantum))
+                    past -= wp.cross(turned, normal - lag) * (radius - share * overlap)
+                    met = drifting(met, past, turned, lag)
                 kind = int(0)
                 if wp.static(materials):
                     kind = material[i]

@@ -223,9 +223,13 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     velocity -= wp.cross(spin_i, normal) * (radius - half)
                 met = meeting(normal, overlap, velocity, turning, law_radius, least, of_i[3])
                 if wp.static(halves):
-                    past = half_motion[i] - state.velocity - wp.cross(state.spin, point)
-                    past -= wp.cross(half_spin[i], normal) * (radius - half)
-                    met = drifting(met, past, half_spin[i] - state.spin)
+                    past = half_motion[i] - state.velocity
+                    lag = wp.cross(state.spin, normal) * (real(0.5) * dt)
+                    if shape.radius > real(0.0):
+                        lag = past - wp.cross(state.spin, arm)
+                        lag = (lag - normal * wp.dot(lag, normal)) * (real(0.5) * dt / reach)
+                    past -= wp.cross(state.spin, point) + wp.cross(half_spin[i], normal - lag) * (radius - half)
+                    met = drifting(met, past, half_spin[i] - state.spin, lag)
                 kind = int(0)
                 if wp.static(materials):
                     kind = material[i]

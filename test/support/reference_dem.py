@@ -48,8 +48,11 @@ class ReferenceDem:
                 at_i = self.v[i] + np.cross(self.w[i], -arm_i * normal)
                 at_j = self.v[j] + np.cross(self.w[j], arm_j * normal)
                 c = {"normal": normal, "overlap": overlap, "velocity": at_i - at_j, "spin": self.w[i] - self.w[j]}
-                past_i, past_j = hv[i] + np.cross(hw[i], -arm_i * normal), hv[j] + np.cross(hw[j], arm_j * normal)
-                c |= {"drift": past_i - past_j, "roll": hw[i] - hw[j]}
+                past, roll = hv[i] - hv[j], hw[i] - hw[j]
+                lag = 0.5 * self.dt * (past - normal * (past @ normal)) / (self.r[i] + self.r[j])
+                lag *= self.integrator == "velocity_verlet"
+                drift = past - np.cross(arm_i * hw[i] + arm_j * hw[j], normal - lag)
+                c |= {"drift": drift, "roll": roll + lag * (roll @ normal) - normal * (roll @ lag)}
                 c["radius"] = self.r[i] * self.r[j] / (self.r[i] + self.r[j])
                 c["mass"] = self.m[i] * self.m[j] / (self.m[i] + self.m[j])
                 c["least"] = min(self.r[i], self.r[j])
