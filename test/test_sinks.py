@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import resource
 import signal
 import socket
@@ -277,6 +278,20 @@ def test_a_history_stays_within_its_bound(tmp_path):
     assert steps[0] <= 1
     assert steps[-1] >= 1000 - 2 * 1000 / 10
     assert len(set(np.diff(steps))) == 1
+
+
+def test_frames_are_written_in_few_pieces(tmp_path, world):
+    """Rerun keeps something of each piece in memory to the end: of slow runs it was a gigabyte an hour."""
+    recorder = Recorder(world, tmp_path / "run.rrd")
+    for _ in range(20):
+        frames(recorder, world, 1)
+        time.sleep(0.05)
+    recorder.close()
+    told = subprocess.run(
+        [sys.executable, "-m", "rerun", "rrd", "stats", tmp_path / "run.rrd"], capture_output=True, text=True, check=True
+    ).stdout
+    pieces, entities = (int(re.search(rf"{name} = (\d+)", told)[1]) for name in ("num_chunks", "num_entity_paths"))
+    assert pieces < 2 * entities
 
 
 def test_columns_of_the_history_are_those_that_are_documented(tmp_path):

@@ -3,6 +3,7 @@
 import os
 import select
 import threading
+from datetime import timedelta
 from pathlib import Path
 
 import rerun as rr
@@ -11,6 +12,7 @@ from sand_sim.border import Observation
 from sand_sim.sinks.drawing import Drawing
 from sand_sim.world import World
 
+_GATHERED = timedelta(seconds=5.0)  # until frames are written; Rerun remembers 3 kB of each piece to the end, and each has 20
 _RETRY = 1.0  # [s] between two tries to write
 _MOST_WAITING = 64 * 2**20  # bytes that may wait for a disk
 _PIECE = 2**20  # bytes
@@ -64,7 +66,8 @@ class RecordingFile:
     def _begin(self) -> None:
         reading, writing = os.pipe()
         self._pump = _Pump(reading, self.path)
-        self._stream = rr.RecordingStream("sand_sim", recording_id=self._identity)
+        gathering = rr.ChunkBatcherConfig(flush_tick=_GATHERED)
+        self._stream = rr.RecordingStream("sand_sim", recording_id=self._identity, batcher_config=gathering)
         self._stream.set_sinks(rr.FileSink(f"/dev/fd/{writing}"))
         os.close(writing)
         self._drawing = Drawing(self._world, self._stream, self._particles)
