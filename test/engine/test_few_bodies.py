@@ -110,6 +110,16 @@ def test_short_steps_fall_as_fast_as_long_ones(make_world, young, speed, integra
     assert -(velocity + speed) / world.time == pytest.approx(9.81, rel=1e-4)
 
 
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_a_grain_that_creeps_less_than_a_quantum_a_step_arrives(make_world, precision):
+    quantum = make_world([[0.0, 0.0, 0.1]], 0.005, precision=precision, domain=HIGH).assembly.lattice.quantum
+    speed = 0.2 * quantum / 1e-5
+    world = make_world([[0.0, 0.0, 0.1]], 0.005, velocity=[0.0, speed, 0.0], precision=precision, domain=HIGH, time_step=1e-5)
+    assert world.assembly.lattice.quantum == quantum
+    world.step(1000)
+    assert world.observe().grains.position[0, 1] == pytest.approx(200.0 * quantum, abs=1.01 * quantum)
+
+
 def test_short_steps_slow_a_sliding_sphere(make_world):
     """By ``mu g``, while it takes up spin at ``5/2 mu g/R``."""
     radius, friction, young = 0.0005, 0.3, 1e9

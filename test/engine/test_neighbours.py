@@ -78,6 +78,29 @@ def test_history_survives_renumbering(make_world):
     assert np.abs(found[0].spin - found[1].spin).max() < 1e-8
 
 
+def test_history_survives_that_two_grains_swap_places_in_the_list(make_world):
+    """Two stuck grains turn about each other on loaded springs; now the one, now the other is first in the order of the cells."""
+    speed = 0.25
+    position = np.array([[-0.00499, 0.0, 0.0], [0.00499, 0.0, 0.0], [-0.03, -0.03, -0.03]])  # the third holds the cells still
+    velocity, spin = [[0.0, -speed, 0.0], [0.0, speed, 0.0], [0.0] * 3], [[20.0, 0.0, 5.0], [-20.0, 30.0, 0.0], [0.0] * 3]
+    contact = {"tangential": "mindlin_rescaled", "rolling": "spring", "twisting": "marshall", "cohesion": "capillary"}
+    common = {"velocity": velocity, "spin": spin, "contact": contact, "restitution": 1.0, "time_step": 2e-5}
+    common |= {"numbers": {"friction": 0.8, "rolling_friction": 0.3}, "liquid": {"saturation": 0.2, "surface_tension": 2.0}}
+    worlds = [make_world(position, 0.005, skin=skin, **common) for skin in (1e-4, 5e-2)]  # many searches, and one
+    owners, springs = [], []
+    for _ in range(40):
+        for world in worlds:
+            world.step(250)
+        arrays = worlds[0].assembly.solver.arrays
+        owners.append(arrays.grains.identity.numpy()[arrays.pair_list.owner.numpy()[0]])
+        springs.append(np.abs(arrays.pair_list.memory.numpy()[0]))
+        found = [world.observe().grains for world in worlds]
+        assert np.abs(found[0].position - found[1].position).max() < 1e-10
+        assert np.abs(found[0].spin - found[1].spin).max() < 1e-6
+    assert np.count_nonzero(np.diff(owners)) >= 2
+    assert np.all(np.median(springs, axis=0) > 0.0), "a spring is not loaded"
+
+
 def test_grains_that_leave_are_counted_and_retired(make_world):
     position, radius = cloud(60, SIZES["two sizes"], 0.2, seed=3)
     velocity = 20.0 * (position - 0.1)

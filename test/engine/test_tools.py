@@ -32,8 +32,10 @@ def make_plate_world(tmp_path):
     return make
 
 
-def test_tool_carries_a_resting_grain(make_plate_world):
-    world = make_plate_world([[0.0, 0.0, 0.0072]], gravity=[0.0, 0.0, -9.81], restitution=0.2, friction=0.8)
+@pytest.mark.parametrize("yaw", [0.0, 1.2])
+def test_tool_carries_a_resting_grain(make_plate_world, yaw):
+    pose = {"pose": {"position": [0.0, 0.0, 0.0], "rpy": [0.0, 0.0, yaw]}}
+    world = make_plate_world([[0.01, 0.0, 0.0072]], pose=pose, gravity=[0.0, 0.0, -9.81], restitution=0.2, friction=0.8)
     world.step(round(1.0 / world.time_step))
     world.observe()
     world.step(200)
@@ -43,7 +45,9 @@ def test_tool_carries_a_resting_grain(make_plate_world):
     assert report.force[2] == pytest.approx(-weight, rel=1e-3)
     assert np.abs(report.world_force[:2]).max() < 1e-2 * weight
     x, y, _ = observation.grains.position[0]
-    assert report.torque == pytest.approx([-weight * y, weight * x, 0.0], abs=2e-3 * weight * 0.03)
+    assert np.hypot(x, y) > 0.005
+    back = np.array([[np.cos(yaw), np.sin(yaw), 0.0], [-np.sin(yaw), np.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
+    assert report.torque == pytest.approx(back @ [-weight * y, weight * x, 0.0], abs=2e-3 * weight * 0.03)
 
 
 def test_particles_lie_as_near_to_each_other_as_asked(make_plate_world):
@@ -128,6 +132,15 @@ def test_turning_tool_carries_grains_round(make_plate_world):
     x, y, _ = observation.grains.position[0]
     assert np.arctan2(y, x) == pytest.approx(0.6, abs=0.15)
     assert observation.tool("plate").spin == pytest.approx([0.0, 0.0, rate], abs=1e-6)
+
+
+def test_a_tool_that_turns_in_place_meets_what_its_corners_reach(make_plate_world):
+    """A grain beside a side of the plate, which the corner comes round to at 3.4 m/s."""
+    world = make_plate_world([[0.0385, 0.0, -0.002]], skin=1e-3)
+    assert len(world.tool_contacts("plate")) == 0
+    world.apply(ToolPose("plate", np.zeros(3), np.array([0.0, 0.0, np.sin(0.4), np.cos(0.4)]), 0.01))
+    world.step(round(0.01 / world.time_step))
+    assert world.observe().grains.velocity[0, 1] > 1.0
 
 
 def test_moving_tool_rebuilds_only_its_own_list(make_plate_world):
