@@ -64,6 +64,20 @@ def test_torque_free_tumbling(make_bodies, precision, integrator):
     assert world.observe().health.kinetic == pytest.approx(energy, rel=1e-5)
 
 
+def test_spheres_of_a_body_know_how_they_moved_over_the_last_step(make_bodies):
+    """Friction springs grow by that; with the arms of now it would be off by half the angle that the body turns by in a step."""
+    ends = [[-0.05, 0.0, 0.0, 0.01], [0.05, 0.0, 0.0, 0.01]]
+    bar = {"spheres": ends, "velocity": [0.1, 0.0, 0.0], "spin": [0.0, 0.0, 50.0]}
+    world = make_bodies({"bar": bar}, solver={"time_step": 1e-4, "force_time_step": True})
+    world.step(20)
+    grains, quantum = world.assembly.solver.arrays.grains, world.assembly.lattice.quantum
+    before = grains.place.numpy()[:, :3].astype(float)
+    world.step(1)
+    way = quantum * (grains.place.numpy()[:, :3] - before)
+    assert np.linalg.norm(way, axis=1).max() > 2e-4
+    assert grains.half_motion.numpy() * world.time_step == pytest.approx(way, abs=1e-8)
+
+
 def test_contacts_of_two_bodies_are_those_of_their_spheres(make_bodies):
     """A dumbbell on another one, 10 um deep: F = 4/3 E* sqrt(R*) d^(3/2) at each end, none between the balls of one of them."""
     balls, deep = [[-0.01, 0.0, 0.0, 0.01], [0.01, 0.0, 0.0, 0.01]], 1e-5

@@ -57,6 +57,13 @@ def test_other_content_or_options_are_sampled_anew(box, folder):
     assert len(list(folder.iterdir())) == 5
 
 
+def test_another_sampler_samples_anew(box, folder, monkeypatch):
+    sample_file(box, 0.004)
+    monkeypatch.setattr("sampler.cache._code", lambda: b"of tomorrow")
+    sample_file(box, 0.004)
+    assert len(list(folder.iterdir())) == 2
+
+
 def test_meshes_whose_triangles_lie_in_another_file_are_known_by_that(tmp_path):
     for size in (0.1, 0.2):
         for name, content in trimesh.exchange.gltf.export_gltf(trimesh.Scene(trimesh.creation.box((size, size, size)))).items():
