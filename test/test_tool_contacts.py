@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from scenes import SceneMaker, write_small_scene
 
-from sand_sim import CommandError, ToolPose, World, load_scene, read_scene
+from sand_sim import CommandError, ToolPose, World, load_scene, read_scene, rotation
 
 YOUNG, POISSON, RADIUS, PARTICLE = 1e7, 0.25, 0.005, 0.002
 
@@ -37,6 +37,19 @@ def test_contacts_add_up_to_the_wrench(tmp_path, precision, tolerance, rolling):
     assert contacts.couple.any() == (rolling != "none")
     report = world.observe().tool("plate")
     assert contacts.origin == pytest.approx(report.position, abs=1e-9)
+
+
+def test_the_wrench_is_told_in_the_axes_of_the_tool(tmp_path):
+    world = World(load_scene(write_small_scene(tmp_path)))
+    world.apply(ToolPose("plate", np.array([0.015, 0.015, 0.023]), rotation.from_rpy(0.1, -0.05, 1.0), 0.2))
+    world.step(round(0.2 / world.time_step))
+    world.observe()
+    report = world.observe().tool("plate")  # of this moment, as no time has passed in between
+    back = rotation.to_matrices(report.orientation).T
+    for told, wrench in zip((report.force, report.torque), world.tool_contacts("plate").wrench, strict=True):
+        size = np.linalg.norm(wrench)
+        assert told == pytest.approx(back @ wrench, abs=1e-4 * size)
+        assert np.linalg.norm(told - wrench) > 0.05 * size
 
 
 def test_points_lie_where_grain_and_tool_meet(tmp_path):

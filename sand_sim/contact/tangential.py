@@ -89,7 +89,9 @@ def build_linear(precision: Precision, types: ContactTypes) -> wp.Function:
     """Linear tangential spring-dashpot with history, bounded by Coulomb friction.
 
     ``F = -k_s s - 2 z sqrt(k_s m*) v_s`` and ``|F| <= mu F_n``; the spring s is turned with the tangent plane and grows by
-    ``v_s dt``; while sliding it yields to what the bound can hold.
+    ``v_s dt``; while sliding it yields to what the bound can hold. With a restitution of one it is the displacement-Coulomb law
+    of source document A (Lee & Herrmann 1993, https://doi.org/10.1088/0305-4470/26/2/021) but for that: there the spring holds
+    all of the displacement since touch, so that a contact which has slid a long way is pushed back with the whole bound.
 
     Source: Cundall & Strack 1979, https://doi.org/10.1680/geot.1979.29.1.47; Luding 2008,
     https://doi.org/10.1007/s10035-008-0099-x.

@@ -1,6 +1,7 @@
 """The ball shot into a bed, against eight other codes."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -25,9 +26,9 @@ def test_missing_data_are_refused_in_one_line(tmp_path):
 
 @pytest.mark.slow
 def test_ball_goes_as_deep_as_in_eight_other_codes(tmp_path):
-    data = ROOT.parent / "shared/data/dosta"
+    data = Path(os.environ.get("DOSTA_DATA", ROOT.parent / "shared/data/dosta"))
     if not data.is_dir():
-        pytest.skip(f"needs the data set of the case in {data}")
+        pytest.skip(f"needs the data set of the case in {data}, or where DOSTA_DATA says")
     done = run("--data", data, "--out", tmp_path)
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)

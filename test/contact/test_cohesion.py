@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from scenes import record
+import trimesh
+from scenes import floor, record
 
 POISSON, DENSITY = 0.3, 2650.0
 
@@ -86,6 +87,36 @@ def test_bridge_keeps_account_of_its_energy(make_world):
     scaled = gap * np.sqrt(RADIUS / VOLUME)
     work = np.trapezoid(2.0 * np.pi * RADIUS * 0.073 / (1.0 + 1.05 * scaled + 2.5 * scaled**2), gap)
     assert world.observe().health.dissipated == pytest.approx(work, rel=1e-2)
+
+
+@pytest.mark.parametrize("partner", ["floor", "plate"])
+def test_bridge_to_a_surface_costs_its_work(make_world, tmp_path, partner):
+    """A grain leaves a wall or a smooth tool (R twice its radius); lists made anew on the way keep its bridge."""
+    trimesh.creation.box((0.01, 0.01, 0.002)).export(tmp_path / "plate.stl")
+    plate = {"mesh": "plate.stl", "material": "wall", "particle_radius": 0.001, "contact": "smooth"}
+    plate["pose"] = {"position": [0.0, 0.0, -0.001]}
+    surface = {"boundaries": floor()} if partner == "floor" else {"tools": {"plate": plate}}
+    world = make_world(
+        [[0.0, 0.0, RADIUS - 1e-9]],
+        RADIUS,
+        velocity=[0.0, 0.0, 0.5],
+        material={"density": DENSITY, "young": 1e7, "poisson": POISSON},
+        restitution=1.0,
+        friction=0.0,
+        contact={"cohesion": "capillary"},
+        liquid=LIQUID,
+        skin=2e-5,
+        time_step=2e-7,
+        domain={"low": [-0.01] * 3, "high": [0.01] * 3},
+        threads=1,
+        **surface,
+    )
+    before = world.observe().health.kinetic
+    world.step(round(2.0 * RUPTURE / 0.5 / 2e-7))
+    gap = np.linspace(0.0, RUPTURE, 2000)
+    scaled = gap * np.sqrt(2.0 * RADIUS / VOLUME)
+    work = np.trapezoid(2.0 * np.pi * 2.0 * RADIUS * 0.073 / (1.0 + 1.05 * scaled + 2.5 * scaled**2), gap)
+    assert before - world.observe().health.kinetic == pytest.approx(work, rel=1e-2)
 
 
 WIDE, ADHESION, YOUNG = 0.005, 0.2, 1e7

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scenes import floor, record
 
+from sand_sim.contact.damping import damping_ratio, restitution_of_damping
+
 # name: radius [m], speed of each body [m/s], E [Pa], nu, rho, spheres (2) or plane (1), F_max [N], d_max [m], t_c [s]
 HERTZ = {
     "T1 glass": (0.01, 10.0, 48e9, 0.20, 2800.0, 2, 10697.0, 274.11e-6, 40.34e-6),
@@ -72,6 +74,19 @@ def rebound(make_world, partner, speed, radius=RADIUS, gap=1e-3 * RADIUS, **furt
     observation = world.observe()
     assert observation.health.elastic == 0.0, "still in contact"
     return float(np.abs(observation.grains.velocity).max()) / speed
+
+
+# Restitution that Tsuji's beta gives where the force never pulls, and the beta that gives the asked one; z = sqrt(5/6) beta.
+CLIPPED = {0.1: 0.2527, 0.3: 0.3971, 0.5: 0.5503, 0.7: 0.7182, 0.9: 0.9020, 0.99: 0.9900}
+BETAS = [1.2427, 0.7311, 0.4972, 0.3545, 0.2553, 0.1809, 0.1222, 0.0744, 0.0343, 0.0165, 0.0032]
+
+
+def test_damping_of_the_clipped_law():
+    asked = np.log(list(CLIPPED))
+    ratios = -np.sqrt(5.0 / 6.0) * asked / np.sqrt(asked**2 + np.pi**2)
+    assert restitution_of_damping(1.5, ratios) == pytest.approx(list(CLIPPED.values()), abs=2e-4)
+    found = [damping_ratio(e, 1.5) / np.sqrt(5.0 / 6.0) for e in RESTITUTIONS]
+    assert found == pytest.approx(BETAS, rel=2e-3, abs=1e-4)
 
 
 @pytest.mark.parametrize("normal", ["hertz", "linear"])

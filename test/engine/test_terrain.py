@@ -6,6 +6,7 @@ from PIL import Image
 from scenes import SceneMaker
 
 from sand_sim import SceneError, World, read_scene
+from sand_sim.scene.heights import read_heights
 
 GRAVITY, RADIUS, SPACING = 9.81, 0.006, 0.005
 ROWS, COLUMNS = 21, 41  # 0.1 m along y, 0.2 m along x
@@ -44,6 +45,11 @@ def write_heights(folder, kind):
     levels = np.rint(valley()[::-1] / 0.1 * 65535.0).astype(np.uint16)  # the upper edge of a map is far along y
     Image.fromarray(levels).save(path)
     return path.name, 0.1
+
+
+def test_the_lowest_row_of_a_picture_is_the_first(tmp_path):
+    Image.fromarray(np.array([[255, 0], [51, 102]], np.uint8)).save(tmp_path / "ground.png")
+    assert read_heights(tmp_path / "ground.png") == pytest.approx(np.array([[0.2, 0.4], [1.0, 0.0]]))
 
 
 @pytest.mark.parametrize("kind", ["npz", "csv", "png"])

@@ -14,6 +14,7 @@ def test_the_worst_place_is_found(seed):
     body = sample_body(trimesh.creation.box(extents), radius=0.002, count=300, seed=seed)
     worst = worst_on_a_box(extents, body.points)
     assert body.coverage == pytest.approx(worst, rel=2e-3)
+    assert body.smallest_grain == pytest.approx(worst - 0.002, abs=2e-3 * worst)
     assert body.evenness.skin_coverage >= body.evenness.coverage
 
 

@@ -32,6 +32,23 @@ def test_own_step_is_checked(make_world):
         make_world([[0.0, 0.0, 0.0]], 0.005, time_step=10.0 * safe)
 
 
+LIMITS = {  # as docs/scenes.md has them: share, of what, and a scene in which it decides
+    "contact time": (1.0 / 25.0, "contact", {"velocity": [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]}),
+    "Rayleigh time": (0.2, "rayleigh", {"contact": {"tangential": "none"}}),
+    "stability of damped contacts": (1.0, "stable", {"restitution": 0.5}),
+    "travel in one step": (0.05, "speed", {"velocity": [[40.0, 0.0, 0.0], [0.0, 0.0, 0.0]]}),
+}
+
+
+@pytest.mark.parametrize("reason", LIMITS)
+def test_the_smallest_limit_decides_by_its_share(make_world, reason):
+    share, name, further = LIMITS[reason]
+    chosen = make_world([[0.0, 0.0, 0.0], [0.02, 0.0, 0.0]], 0.005, **{"restitution": 1.0} | further).assembly.time_step
+    assert chosen.reason == reason
+    whole = 0.005 / chosen.speed if name == "speed" else getattr(chosen, name)
+    assert chosen.safe == pytest.approx(share * whole, rel=1e-12)
+
+
 def test_frames_are_whole_numbers_of_steps(make_world):
     world = make_world([[0.0, 0.0, 0.0]], 0.005, frame_rate=50.0)
     assert world.frame_steps * world.time_step == pytest.approx(0.02, rel=1e-12)
