@@ -18,7 +18,7 @@ from sand_sim.grain_table import GrainTable
 from sand_sim.playing import check_trajectory
 from sand_sim.precision import PRECISIONS, Precision
 from sand_sim.scene.checking import check_scene
-from sand_sim.scene.filling import fill_grains, smallest_sphere
+from sand_sim.scene.filling import fill_grains, smallest_of_materials, smallest_sphere
 from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.stable_step import DEEP
 from sand_sim.scene.time_step import TimeStep, choose_time_step, fastest_speed
@@ -155,7 +155,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     ]
     table = GrainTable.join([*fills, *(body.table(order.index(body.body.material)) for body in bodies)])
     device = _open_device(scene, len(table))
-    smallest = _smallest(scene, table, order)
+    smallest = smallest_of_materials(scene.fills, table, order)
     light = lighten(scene, table, order)
     time_step, frame_steps = _time_step(light, table, smallest, walls, tools, grounds)
     precision = PRECISIONS[scene.solver.precision]
@@ -243,14 +243,6 @@ def _tool_body(tool: ToolModel, order: list[str]) -> ToolBody:
 def _loose_materials(scene: Scene) -> set[str]:
     """Names of the materials of everything that moves freely."""
     return {one.material for one in (*scene.fills, *scene.bodies)}
-
-
-def _smallest(scene: Scene, table: GrainTable, order: list[str]) -> dict[str, float]:
-    """Smallest radius of each grain material [m], of fills that draw it the least they may draw, whatever the seed."""
-    drawn = {order[k]: float(table.radius[table.material == k].min()) for k in np.unique(table.material)}
-    fills = [fill for fill in scene.fills if fill.file is None]
-    limits = {name: smallest_sphere(fill for fill in fills if fill.material == name) for name in drawn}
-    return {name: min(radius, limits[name] or radius) for name, radius in drawn.items()}
 
 
 def material_order(scene: Scene) -> list[str]:

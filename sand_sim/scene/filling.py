@@ -74,6 +74,14 @@ def smallest_sphere(fills: Iterable[Fill]) -> float | None:
     return min(map(_smallest, fills), default=None)
 
 
+def smallest_of_materials(fills: Iterable[Fill], table: GrainTable, order: list[str]) -> dict[str, float]:
+    """Smallest radius of each grain material [m], of fills that draw it the least they may draw, whatever the seed."""
+    drawn = {order[k]: float(table.radius[table.material == k].min()) for k in np.unique(table.material)}
+    fills = [fill for fill in fills if fill.file is None]
+    limits = {name: smallest_sphere(fill for fill in fills if fill.material == name) for name in drawn}
+    return {name: min(radius, limits[name] or radius) for name, radius in drawn.items()}
+
+
 def _smallest(fill: Fill) -> float:
     shape = shape_named(fill.shape, f"fills: '{fill.name}'")
     share = float(shape.radii.min()) / shape.equal_radius if shape else 1.0
