@@ -71,5 +71,5 @@ def _check_inside(table: GrainTable, low: np.ndarray, high: np.ndarray) -> None:
     if outside.any():
         raise SceneError(
             f"domain: {outside.sum()} of {len(centres)} grains start outside of it, the first at "
-            f"{centres[outside][0].round(6).tolist()} m; enlarge 'domain' or move them"
+            f"{(centres[outside][0].round(6) + 0.0).tolist()} m; enlarge 'domain' or move them"  # without -0.0
         )
