@@ -1,5 +1,7 @@
 """Closing holes: boundary loops of a component and the triangles of least area that span them."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from sampler.topology import edges_of
@@ -7,25 +9,50 @@ from sampler.topology import edges_of
 _LONGEST = 80  # corners of a loop that are spanned with least area; longer loops are first cut at their flattest corners
 
 
-def close_holes(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+@dataclass(frozen=True)
+class Caps:
+    """What closes holes.
+
+    Attributes:
+        faces: oriented as their component, shape (k, 3).
+        owner: component of each, shape (k,).
+        loop: number of the boundary loop that each helps to close, shape (k,): one of n corners takes n - 2 faces.
+        turn: by how much each loop turns in all [rad], shape (loops,).
+    """
+
+    faces: np.ndarray
+    owner: np.ndarray
+    loop: np.ndarray
+    turn: np.ndarray
+
+
+def close_holes(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) -> Caps:
     """Span all boundary loops of consistently oriented components.
 
     Args:
         vertices: shape (n, 3) [m].
         faces: shape (m, 3).
         component: of each face, shape (m,).
-
-    Returns:
-        Faces of the caps, oriented as their component, shape (k, 3); component of each, shape (k,); number of the loop that
-        each helps to close, shape (k,): one of n corners takes n - 2 faces.
     """
-    caps, owners, loops = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
-    for number, (owner, loop) in enumerate(boundary_loops(faces, component)):
-        cap = span_loop(vertices, loop)
-        caps.append(cap)
-        owners.append(np.full(len(cap), owner))
-        loops.append(np.full(len(cap), number))
-    return np.concatenate(caps), np.concatenate(owners), np.concatenate(loops)
+    caps, owners, turn = [np.zeros((0, 3), np.int64)], [], []
+    for owner, loop in boundary_loops(faces, component):
+        caps.append(span_loop(vertices, loop))
+        owners.append(owner)
+        turn.append(_turn(vertices[loop]))
+    number = [len(cap) for cap in caps[1:]]
+    return Caps(
+        np.concatenate(caps),
+        np.repeat(np.array(owners, np.int64), number),
+        np.repeat(np.arange(len(number)), number),
+        np.array(turn),
+    )
+
+
+def _turn(corners: np.ndarray) -> float:
+    """Sum of the angles by which a loop, shape (n, 3), turns at its corners [rad]: once round if it is plane and convex."""
+    side = np.roll(corners, -1, axis=0) - corners
+    after = np.roll(side, -1, axis=0)
+    return float(np.arctan2(np.linalg.norm(np.cross(side, after), axis=1), np.einsum("ij,ij->i", side, after)).sum())
 
 
 def boundary_loops(faces: np.ndarray, component: np.ndarray):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import trimesh
 
-from sampler.caps import close_holes
+from sampler.caps import Caps, close_holes
 from sampler.errors import MeshError
 from sampler.orientation import agree_faces, face_outward, inward_pieces, outside_on_both_sides
 from sampler.reading import check_mesh
@@ -20,6 +20,8 @@ SOLID, CAP, SHEET = 0, 1, 2
 
 _SHEET = 0.10  # a component is a sheet if closing it takes more area than this share of its own
 _TORN, _PLANE = 0.6, 0.95  # holes count so much of that if their caps, as vectors, have less of their area: openings are plane
+_RAGGED = 0.2  # and so much of it if their rim zigzags, as where faces were broken out:
+_ROUND, _SHARP = 2.5 * np.pi, 0.3 * np.pi  # it turns so far in all, where openings turn once round, and so far at a corner
 _ENCLOSED = 0.9  # share of the area that must have an inside for loose pieces to count as one solid
 _ASKED = 4000  # faces are enough to tell that share
 _FEW = 8  # faces of a component in which a hole of three corners is nothing special
@@ -77,7 +79,8 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     Args:
         mesh: in metres.
         sheets: ``auto`` takes an open component for a sheet where closing it would take more than a tenth of its area,
-            or a sixth where its rims lie in no plane and so are torn; ``never`` closes all, ``always`` none.
+            a sixth where its rims lie in no plane and so are torn, or half where they zigzag; ``never`` closes all,
+            ``always`` none.
 
     Raises:
         MeshError: if there are no sound triangles, or they are loose and enclose nothing.
@@ -96,13 +99,13 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
         vertices = _meet(vertices, sewn)
         faces = _drop(sewn[faces], report)
     faces, component, piece, report.steps["faces turned"], clashes = agree_faces(vertices, faces)
-    caps, owner, loop = close_holes(vertices, faces, component)
+    caps = close_holes(vertices, faces, component)
     area = np.bincount(component, Surface.areas_of(vertices[faces]))
-    sheet = _sheets(sheets, component, area, owner, loop, vertices[caps])
+    sheet = _sheets(sheets, component, area, caps, vertices)
     enclosing = sheets == "auto" and sheet.sum() > 1 and _enclosing(vertices[faces], sheet[component], sheet.sum() > _SCATTERED)
     if not enclosing and sheets != "never":
         _refuse_soup(component, area, sheet)
-    keep = ~sheet[owner]
+    keep = ~sheet[caps.owner]
     loose = sheet.copy()
     crumbs = sheet & (area < _CRUMB * area.sum())
     closed = not (enclosing or (crumbs.sum() > _SCATTERED and sheets == "auto"))
@@ -112,17 +115,17 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
         report.warnings.append(f"{taken.sum()} open pieces are taken for parts of one cracked surface")
     sheet &= area > _FLAKE * area.sum()
     kind = np.where(sheet[component], SHEET, SOLID)
-    report.steps["holes closed"] = len(np.unique(loop[keep]))
+    report.steps["holes closed"] = len(np.unique(caps.loop[keep]))
     report.steps["sheets"] = int(sheet.sum())
-    faces = np.concatenate([faces, caps[keep]])
-    component = np.concatenate([component, owner[keep]])
+    faces = np.concatenate([faces, caps.faces[keep]])
+    component = np.concatenate([component, caps.owner[keep]])
     kind = np.concatenate([kind, np.full(int(keep.sum()), CAP)])
     faces, report.steps["components turned"] = face_outward(vertices, faces, component, loose[component])
     asked = np.flatnonzero((kind == SOLID) & ~loose[component])
     if len(asked) and int(piece.max()) >= len(area):
         faces, kind = _mend_pieces(vertices, faces, kind, piece, asked, report)
-    large = keep & (np.bincount(loop)[loop] > 1)
-    _warn(report, float(Surface.areas_of(vertices[caps[large]]).sum() / area.sum()), int(large.sum()), clashes)
+    large = keep & (np.bincount(caps.loop)[caps.loop] > 1)
+    _warn(report, float(Surface.areas_of(vertices[caps.faces[large]]).sum() / area.sum()), int(large.sum()), clashes)
     return RepairedMesh(vertices, faces, kind, closed, report)
 
 
@@ -202,19 +205,21 @@ def _mend_pieces(vertices, faces, kind, piece, asked, report) -> tuple[np.ndarra
     return faces, kind
 
 
-def _sheets(choice: str, component, area, owner, loop, caps) -> np.ndarray:
+def _sheets(choice: str, component: np.ndarray, area: np.ndarray, caps: Caps, vertices: np.ndarray) -> np.ndarray:
     """Components that are sheets. A hole of three corners in more than a few faces is a face that was lost."""
     if choice == "never":
         return np.zeros(len(area), bool)
     if choice == "always":
-        return np.bincount(owner, minlength=len(area)) > 0
-    across = 0.5 * np.cross(caps[:, 1] - caps[:, 0], caps[:, 2] - caps[:, 0])
-    cap_area = np.linalg.norm(across, axis=1)
+        return np.bincount(caps.owner, minlength=len(area)) > 0
+    corner, loop = vertices[caps.faces], caps.loop
+    across = 0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    cap_area, number = np.linalg.norm(across, axis=1), np.bincount(loop)
     straight = np.linalg.norm([np.bincount(loop, x) for x in across.T], axis=0)
-    torn = straight < _PLANE * np.bincount(loop, cap_area)
-    lost = (np.bincount(loop) == 1)[loop] & (np.bincount(component)[owner] > _FEW)
-    counted = np.where(lost, 0.0, np.where(torn[loop], _TORN, 1.0)) * cap_area
-    return np.bincount(owner, counted, minlength=len(area)) > _SHEET * area
+    counts = np.where(straight < _PLANE * np.bincount(loop, cap_area), _TORN, 1.0)
+    counts[(caps.turn > _ROUND) & (caps.turn > _SHARP * (number + 2))] = _RAGGED
+    counts = counts[loop]
+    counts[(number == 1)[loop] & (np.bincount(component)[caps.owner] > _FEW)] = 0.0
+    return np.bincount(caps.owner, counts * cap_area, minlength=len(area)) > _SHEET * area
 
 
 def _enclosing(triangles: np.ndarray, open_: np.ndarray, lenient: bool) -> bool:

@@ -74,8 +74,8 @@ def thicken(vertices: np.ndarray, faces: np.ndarray, thickness: float) -> tuple[
         np.stack([front[face, head], back[face, tail], back[face, head]], axis=1),
     ]
     faces = np.concatenate([front, back[:, ::-1], *strip])
-    ends, _, _ = close_holes(place, faces, np.zeros(len(faces), np.int64))  # where several rims meet
-    return place + 0.5 * thickness * offset, np.concatenate([faces, ends])
+    ends = close_holes(place, faces, np.zeros(len(faces), np.int64))  # where several rims meet
+    return place + 0.5 * thickness * offset, np.concatenate([faces, ends.faces])
 
 
 def beyond_rims(vertices: np.ndarray, faces: np.ndarray, around: Surface, spacing: float) -> np.ndarray:

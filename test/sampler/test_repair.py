@@ -8,7 +8,8 @@ from shapes import THIN, damaged, far_from_surface, grid_around, robot_mesh, sol
 from sampler import SignedDistance, read_mesh, repair_mesh, sample_body
 from sampler.caps import span_loop
 from sampler.mass import integrate
-from sampler.repair import SHEET
+from sampler.repair import CAP, SHEET
+from sampler.surface import Surface
 
 HARMLESS = ("flipped", "doubled", "doubled with backs", "cracked", "missing")
 
@@ -51,6 +52,18 @@ def test_a_torn_hole_may_be_larger_than_an_opening():
     for sound, gone, sheets in ((ring, torn, 0), (tube, opening, 1)):
         assert 0.1 < sound.area_faces[gone].sum() / sound.area < 0.13
         assert repair_mesh(loose(np.asarray(sound.triangles)[~gone])).report.steps["sheets"] == sheets
+
+
+def test_a_part_from_which_faces_were_broken_out_is_no_sheet():
+    """Its rim zigzags from face to face; the same piece cut off along a plane leaves an opening."""
+    ball = trimesh.creation.icosphere(subdivisions=1)
+    ragged = trimesh.Trimesh(ball.vertices, ball.faces[ball.triangles_center[:, 2] < 0.3])
+    plane = trimesh.creation.cylinder(1.0, 1.2, sections=24)
+    plane.update_faces(plane.triangles[:, :, 2].min(axis=1) < 0.5)  # without its end
+    for broken, sheets in ((ragged, 0), (plane, 1)):
+        closed = repair_mesh(broken, sheets="never")
+        assert Surface.areas_of(closed.triangles[closed.kind == CAP]).sum() > 0.25 * broken.area
+        assert repair_mesh(broken).report.steps["sheets"] == sheets
 
 
 @pytest.mark.parametrize(("how", "volume", "centre", "inertia"), [("missing", 0.015, 0.003, 0.01), ("hole", 0.06, 0.015, 0.08)])
