@@ -17,6 +17,7 @@ from sampler.topology import edges_of, link_items, merge_points
 from sampler.welding import sew_edges
 
 SOLID, CAP, SHEET = 0, 1, 2
+SHEETS = "auto", "never", "always"
 
 _SHEET = 0.10  # a component is a sheet if closing it takes more area than this share of its own
 _TORN, _PLANE = 0.6, 0.95  # holes count so much of that if their caps, as vectors, have less of their area: openings are plane
@@ -85,7 +86,7 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     Raises:
         MeshError: if there are no sound triangles, or they are loose and enclose nothing.
     """
-    if sheets not in ("auto", "never", "always"):
+    if sheets not in SHEETS:
         raise MeshError(f"sheets must be auto, never or always, got '{sheets}'")
     check_mesh(mesh)
     report = RepairReport()

@@ -91,7 +91,7 @@ def model_body(body: Body, scene: Scene, grain: float | None, progress) -> BodyM
         try:
             path, show = locate_mesh(body.mesh, scene.folder), partial(progress, f"sampling {body.name}")
             mesh = read_mesh(path, body.scale)
-            options = {"grain": grain, "thickness": body.thickness, "progress": show}
+            options = {"grain": grain, "thickness": body.thickness, "sheets": body.sheets, "progress": show}
             skin = sample_file(path, body.particle_radius, body.scale, **options)
         except MeshError as error:
             raise SceneError(f"{where}.mesh: {error}") from None

@@ -100,7 +100,7 @@ def model_tool(tool: Tool, scene: Scene, grain: float | None, progress: Progress
         mesh = model_link(tool, scene) if tool.link else read_mesh(locate_mesh(tool.mesh, scene.folder), tool.scale)
         show = partial(progress, f"sampling {tool.name}")
         grain = None if tool.contact == SMOOTH else grain
-        options = {"grain": grain, "spacing": tool.particle_spacing, "thickness": tool.thickness}
+        options = {"grain": grain, "spacing": tool.particle_spacing, "thickness": tool.thickness, "sheets": tool.sheets}
         body = sample_mesh(mesh, tool.particle_radius, progress=show, **options)
     except MeshError as error:
         raise SceneError(f"tools.{tool.name}.{'link' if tool.link else 'mesh'}: {error}") from None

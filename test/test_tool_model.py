@@ -9,7 +9,7 @@ import trimesh
 from sand_sim import SceneError
 from sand_sim.body_model import model_body
 from sand_sim.scene.filling import smallest_sphere
-from sand_sim.scene.types import SMOOTH, Body, Fill, SizeDistribution, Tool
+from sand_sim.scene.types import SHEETS, SMOOTH, Body, Fill, SizeDistribution, Tool
 from sand_sim.tool_model import model_tool
 
 RADIUS = 0.004
@@ -53,3 +53,17 @@ def test_no_grain_gets_into_a_body(tmp_path):
     centres = body.shape.centres @ body.shape.axes.T + body.shape.middle
     farthest = np.linalg.norm(places[:, None] - centres, axis=2).min(axis=1).max()
     assert farthest < RADIUS + smallest
+
+
+def test_whoever_writes_the_scene_may_decide_what_a_sheet_is(tmp_path):
+    """A box without its lid: by default a sheet with an inside and an outside, else a solid, as tool and as body."""
+    box = trimesh.creation.box((0.06, 0.06, 0.06))
+    trimesh.Trimesh(box.vertices, box.faces[box.face_normals[:, 2] < 0.5]).export(tmp_path / "bin.stl")
+    sand = SimpleNamespace(density=2000.0)
+    scene = SimpleNamespace(folder=tmp_path, fills=(), materials=[sand], material_index=lambda name: 0)
+    walls, solid = 5 * 0.06**2 * 2 * RADIUS, 0.06**3
+    for sheets, volume in zip(SHEETS, (walls, solid, walls), strict=True):
+        tool = model_tool(Tool("bin", "bin.stl", "steel", RADIUS, sheets=sheets), scene, None)
+        assert tool.body.volume == pytest.approx(volume, rel=0.2)  # walls overlap in edges
+        body = model_body(Body("bin", "sand", "bin.stl", RADIUS, sheets=sheets), scene, None, lambda stage, share: None)
+        assert body.mass == pytest.approx(2000.0 * tool.body.volume)

@@ -18,6 +18,7 @@ from sand_sim.scene.reading_poses import read_pose
 from sand_sim.scene.shapes import SPHERE, TETRAHEDRON
 from sand_sim.scene.types import (
     ROUGH,
+    SHEETS,
     SMOOTH,
     Fill,
     Liquid,
@@ -35,7 +36,7 @@ from sand_sim.scene.types import (
 )
 
 _TOOL_FIELDS = ("mesh", "urdf", "link", "material", "particle_radius", "particle_spacing", "contact", "scale", "thickness")
-_TOOL_FIELDS += ("pose", "max_speed", "trajectory")
+_TOOL_FIELDS += ("sheets", "pose", "max_speed", "trajectory")
 _FEWEST = 0.01  # share of a normal distribution between its limits, so that radii are not drawn for ever
 
 
@@ -259,6 +260,7 @@ def _tool(name: str, entry: Field) -> Tool:
         contact=entry.optional("contact", lambda f: f.choice((ROUGH, SMOOTH)), Tool.contact),
         scale=entry.optional("scale", lambda f: f.number(above=0.0), 1.0),
         thickness=entry.optional("thickness", lambda f: f.number(above=0.0, unit="m"), None),
+        sheets=entry.optional("sheets", lambda f: f.choice(SHEETS), Tool.sheets),
         pose=entry.optional("pose", read_pose, initial),
         max_speed=entry.optional("max_speed", lambda f: f.number(above=0.0, most=FASTEST, unit="m/s"), 2.0),
         trajectory=tuple(track),

@@ -4,9 +4,10 @@ from pathlib import Path
 
 from sand_sim.scene.fields import Field
 from sand_sim.scene.reading_poses import read_pose
-from sand_sim.scene.types import Body, Pose
+from sand_sim.scene.types import SHEETS, Body, Pose
 
-_FIELDS = ("material", "mesh", "particle_radius", "scale", "thickness", "spheres", "pose", "velocity", "spin", "mass", "inertia")
+_SKIN = "mesh", "particle_radius", "scale", "thickness", "sheets"
+_FIELDS = ("material", *_SKIN, "spheres", "pose", "velocity", "spin", "mass", "inertia")
 
 
 def read_body(name: str, entry: Field, folder: Path) -> Body:
@@ -37,6 +38,7 @@ def read_body(name: str, entry: Field, folder: Path) -> Body:
         particle_radius=entry.optional("particle_radius", lambda f: f.number(above=0.0, unit="m"), 0.0),
         scale=entry.optional("scale", lambda f: f.number(above=0.0), 1.0),
         thickness=entry.optional("thickness", lambda f: f.number(above=0.0, unit="m"), None),
+        sheets=entry.optional("sheets", lambda f: f.choice(SHEETS), Body.sheets),
         spheres=entry.optional("spheres", lambda f: _spheres(f, folder), None),
         pose=entry.optional("pose", read_pose, Pose()),
         velocity=entry.optional("velocity", Field.vector, (0.0, 0.0, 0.0)),

@@ -12,6 +12,7 @@ from sand_sim.integrator import VERLET
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w as in geometry_msgs
 ROUGH, SMOOTH = "rough", "smooth"  # whether grains touch a tool's particles or its true surface
+SHEETS = "auto", "never", "always"  # whether open parts of a mesh are sheets, as the sampler takes it; others are closed
 
 
 class SceneError(ValueError):
@@ -162,6 +163,7 @@ class Body:
     particle_radius: float = 0.0  # [m] of the particles that make the mesh's skin
     scale: float = 1.0
     thickness: float | None = None  # [m] of sheets modelled as surfaces; None: two particle radii
+    sheets: str = "auto"  # one of SHEETS
     spheres: Path | tuple[tuple[float, ...], ...] | None = None  # x y z radius [m]
     pose: Pose = field(default_factory=Pose)
     velocity: Vector = (0.0, 0.0, 0.0)  # [m/s] of the centre of mass
@@ -184,6 +186,7 @@ class Tool:
     contact: str = ROUGH  # or SMOOTH
     scale: float = 1.0  # [m per mesh unit]
     thickness: float | None = None  # [m] of sheets modelled as surfaces; None: two particle radii
+    sheets: str = "auto"  # one of SHEETS
     pose: Pose = Pose()
     max_speed: float = 2.0  # [m/s] of any point of the tool; World.apply rejects faster poses, the node slows them
     trajectory: tuple[Waypoint, ...] = ()

@@ -308,8 +308,9 @@ def test_sheet_weighs_what_its_thickness_says(make_bodies, tmp_path):
         made = [make_bodies({"sheet": body | extra}).assembly.bodies[0] for _ in range(2)]
         assert made[0].mass == pytest.approx(MATERIALS["stone"]["density"] * 0.1 * 0.06 * expected, rel=1e-6)
         assert np.array_equal(made[0].shape.centres, made[1].shape.centres)
-    with pytest.raises(SceneError, match="thickness"):
-        make_bodies({"sheet": body | {"thickness": 0.0}})
+    for wrong in ({"thickness": 0.0}, {"sheets": "some"}):
+        with pytest.raises(SceneError, match=f"bodies.sheet.{next(iter(wrong))}"):
+            make_bodies({"sheet": body | wrong})
 
 
 def test_short_steps_let_a_body_fall_as_fast_as_long_ones(make_bodies):

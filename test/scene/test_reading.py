@@ -68,6 +68,7 @@ def test_good_scene_is_read():
         (("boundaries", 0, "normal"), [0, 0, 0], "boundaries[0].normal: must not be the zero vector"),
         (("boundaries", 0, "normal"), [0, 0, float("nan")], "boundaries[0].normal[2]: must be finite"),
         (("tools", "spade", "particle_radius"), 0, "tools.spade.particle_radius: must be greater than 0"),
+        (("tools", "spade", "sheets"), "some", "tools.spade.sheets: unknown 'some'; known are auto, never, always"),
         (
             ("tools", "spade", "pose"),
             {"orientation": [0, 0, 0, 0]},
