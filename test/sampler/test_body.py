@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 import trimesh
-from shapes import SOLIDS, THIN, robot_mesh, solid_angle_inside, wavy_ball, wedge
+from shapes import SOLIDS, THIN, robot_mesh, wavy_ball, wedge
 from spread import distances, neighbours
 
+from benchmarks.sampler_damage import solid_angle_inside
 from sampler import MeshError, SignedDistance, make_field, read_mesh, repair_mesh, sample_body
 from sampler.mass import integrate
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 import trimesh
-from shapes import THIN, damaged, far_from_surface, grid_around, robot_mesh, solid_angle_inside, wavy_ball
+from shapes import THIN, robot_mesh, wavy_ball
 
+from benchmarks.sampler_damage import damaged, far_from_surface, grid_around, solid_angle_inside
 from sampler import SignedDistance, read_mesh, repair_mesh, sample_body
 from sampler.caps import span_loop
 from sampler.mass import integrate

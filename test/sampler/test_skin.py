@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import trimesh
-from shapes import solid_angle_inside
 
+from benchmarks.sampler_damage import solid_angle_inside
 from sampler import sample_body
 from sampler.mass import integrate
 from sampler.rays import closing_cones
