@@ -16,6 +16,7 @@ import trimesh
 from benchmarks.provenance import provenance
 from sampler import MeshError, SignedDistance, read_mesh, repair_mesh
 from sampler.mass import integrate
+from sampler.quiet import start_warp
 
 ENDINGS = ".stl", ".obj", ".ply", ".dae"
 NODES, NEAR, SCATTER = 22, 3000, 5e-3  # of the grid along an axis, places near the surface, and how near, of the diagonal
@@ -131,6 +132,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--faces", nargs=2, type=int, default=(200, 2500), metavar=("LEAST", "MOST"), help="of a mesh")
     parser.add_argument("--most", type=int, default=160, help="meshes")
     options = parser.parse_args(arguments)
+    start_warp()
     found: dict[str, list[list[float]]] = {how: [] for how in MEANT}
     for number, (path, mesh) in enumerate(sound_meshes(options.meshes, options.faces)):
         if number == options.most:
