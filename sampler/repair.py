@@ -21,7 +21,7 @@ SHEETS = "auto", "never", "always"
 
 _SHEET = 0.10  # a component is a sheet if closing it takes more area than this share of its own
 _TORN, _PLANE = 0.6, 0.95  # holes count so much of that if their caps, as vectors, have less of their area: openings are plane
-_RAGGED = 0.2  # and so much of it if their rim zigzags, as where faces were broken out:
+_RAGGED = 0.15  # and so much of it if their rim zigzags, as where faces were broken out:
 _ROUND, _SHARP = 2.5 * np.pi, 0.3 * np.pi  # it turns so far in all, where openings turn once round, and so far at a corner
 _ENCLOSED = 0.9  # share of the area that must have an inside for loose pieces to count as one solid
 _ASKED = 4000  # faces are enough to tell that share
@@ -80,8 +80,8 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     Args:
         mesh: in metres.
         sheets: ``auto`` takes an open component for a sheet where closing it would take more than a tenth of its area,
-            a sixth where its rims lie in no plane and so are torn, or half where they zigzag; ``never`` closes all,
-            ``always`` none.
+            a sixth where its rims lie in no plane and so are torn, or two thirds where they zigzag; ``never``
+            closes all, ``always`` none.
 
     Raises:
         MeshError: if there are no sound triangles, or they are loose and enclose nothing.
