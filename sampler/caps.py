@@ -17,7 +17,7 @@ class Caps:
         faces: oriented as their component, shape (k, 3).
         owner: component of each, shape (k,).
         loop: number of the boundary loop that each helps to close, shape (k,): one of n corners takes n - 2 faces.
-        turn: by how much each loop turns in all [rad], shape (loops,).
+        turn: by how much each loop turns at its corners in all, within the surface it bounds [rad], shape (loops,).
     """
 
     faces: np.ndarray
@@ -34,25 +34,34 @@ def close_holes(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) 
         faces: shape (m, 3).
         component: of each face, shape (m,).
     """
-    caps, owners, turn = [np.zeros((0, 3), np.int64)], [], []
+    caps, owners, loops = [np.zeros((0, 3), np.int64)], [], []
     for owner, loop in boundary_loops(faces, component):
         caps.append(span_loop(vertices, loop))
         owners.append(owner)
-        turn.append(_turn(vertices[loop]))
-    number = [len(cap) for cap in caps[1:]]
-    return Caps(
-        np.concatenate(caps),
-        np.repeat(np.array(owners, np.int64), number),
-        np.repeat(np.arange(len(number)), number),
-        np.array(turn),
-    )
+        loops.append(loop)
+    owner, number = np.array(owners, np.int64), [len(cap) for cap in caps[1:]]
+    turn = _turns(vertices, faces, component, owner, loops)
+    return Caps(np.concatenate(caps), np.repeat(owner, number), np.repeat(np.arange(len(number)), number), turn)
 
 
-def _turn(corners: np.ndarray) -> float:
-    """Sum of the angles by which a loop, shape (n, 3), turns at its corners [rad]: once round if it is plane and convex."""
-    side = np.roll(corners, -1, axis=0) - corners
-    after = np.roll(side, -1, axis=0)
-    return float(np.arctan2(np.linalg.norm(np.cross(side, after), axis=1), np.einsum("ij,ij->i", side, after)).sum())
+def _turns(vertices, faces, component, owner: np.ndarray, loops: list[np.ndarray]) -> np.ndarray:
+    """Sum over each loop of what the angles of the faces at its corners differ from half a turn [rad].
+
+    Bends of the surface do not count: around the rims of a bent strip and of a flat one it is once round, for convex corners.
+    """
+    if not loops:
+        return np.zeros(0)
+    number = [len(loop) for loop in loops]
+    corner = np.repeat(owner, number) * len(vertices) + np.concatenate(loops)
+    known, which = np.unique(corner, return_inverse=True)
+    asked = component[:, None] * len(vertices) + faces
+    place = np.searchsorted(known, asked).clip(max=len(known) - 1)
+    face, k = np.nonzero(known[place] == asked)
+    here, after, before = (vertices[faces[face, (k + step) % 3]] for step in range(3))
+    p, q = after - here, before - here
+    angle = np.arctan2(np.linalg.norm(np.cross(p, q), axis=1), np.einsum("ij,ij->i", p, q))
+    off = np.abs(np.pi - np.bincount(place[face, k], angle, len(known)))
+    return np.bincount(np.repeat(np.arange(len(loops)), number), off[which.ravel()])
 
 
 def boundary_loops(faces: np.ndarray, component: np.ndarray):

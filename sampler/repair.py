@@ -21,8 +21,8 @@ SHEETS = "auto", "never", "always"
 
 _SHEET = 0.10  # a component is a sheet if closing it takes more area than this share of its own
 _TORN, _PLANE = 0.6, 0.95  # holes count so much of that if their caps, as vectors, have less of their area: openings are plane
-_RAGGED = 0.15  # and so much of it if their rim zigzags, as where faces were broken out:
-_ROUND, _SHARP = 2.5 * np.pi, 0.3 * np.pi  # it turns so far in all, where openings turn once round, and so far at a corner
+_RAGGED, _BROKEN = 0.15, 0.2  # and so much of it if their rim zigzags and they are no more than this share of the whole area:
+_ROUND, _SHARP = 2.3 * np.pi, 0.3 * np.pi  # a rim turns so far in all, where one that was meant turns once round; at a corner
 _ENCLOSED = 0.9  # share of the area that must have an inside for loose pieces to count as one solid
 _ASKED = 4000  # faces are enough to tell that share
 _FEW = 8  # faces of a component in which a hole of three corners is nothing special
@@ -80,8 +80,8 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     Args:
         mesh: in metres.
         sheets: ``auto`` takes an open component for a sheet where closing it would take more than a tenth of its area,
-            a sixth where its rims lie in no plane and so are torn, or two thirds where they zigzag; ``never``
-            closes all, ``always`` none.
+            a sixth where its rims lie in no plane and so are torn, or two thirds where they zigzag and it is less than a
+            fifth of the whole; ``never`` closes all, ``always`` none.
 
     Raises:
         MeshError: if there are no sound triangles, or they are loose and enclose nothing.
@@ -217,7 +217,8 @@ def _sheets(choice: str, component: np.ndarray, area: np.ndarray, caps: Caps, ve
     cap_area, number = np.linalg.norm(across, axis=1), np.bincount(loop)
     straight = np.linalg.norm([np.bincount(loop, x) for x in across.T], axis=0)
     counts = np.where(straight < _PLANE * np.bincount(loop, cap_area), _TORN, 1.0)
-    counts[(caps.turn > _ROUND) & (caps.turn > _SHARP * (number + 2))] = _RAGGED
+    small = np.bincount(loop, cap_area) < _BROKEN * area.sum()
+    counts[small & (caps.turn > _ROUND) & (caps.turn > _SHARP * (number + 2))] = _RAGGED
     counts = counts[loop]
     counts[(number == 1)[loop] & (np.bincount(component)[caps.owner] > _FEW)] = 0.0
     return np.bincount(caps.owner, counts * cap_area, minlength=len(area)) > _SHEET * area

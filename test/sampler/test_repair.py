@@ -56,15 +56,19 @@ def test_a_torn_hole_may_be_larger_than_an_opening():
 
 
 def test_a_part_from_which_faces_were_broken_out_is_no_sheet():
-    """Its rim zigzags from face to face; the same piece cut off along a plane leaves an opening."""
+    """Its rim zigzags from face to face; those of a scoop of bent plates and of a cut pipe do not."""
     ball = trimesh.creation.icosphere(subdivisions=1)
     ragged = trimesh.Trimesh(ball.vertices, ball.faces[ball.triangles_center[:, 2] < 0.3])
-    plane = trimesh.creation.cylinder(1.0, 1.2, sections=24)
-    plane.update_faces(plane.triangles[:, :, 2].min(axis=1) < 0.5)  # without its end
-    for broken, sheets in ((ragged, 0), (plane, 1)):
+    pipe = trimesh.creation.cylinder(1.0, 1.2, sections=24)
+    pipe.update_faces(pipe.triangles[:, :, 2].min(axis=1) < 0.5)  # without its end
+    scoop = trimesh.creation.box((1.0, 1.0, 1.0))
+    scoop.update_faces((scoop.face_normals[:, 2] < 0.5) & (scoop.face_normals[:, 0] < 0.5))  # without its top and front
+    rest = trimesh.creation.box((3.0, 3.0, 3.0))
+    rest.apply_translation((10.0, 0.0, 0.0))
+    for broken, sheets in ((ragged, 0), (pipe, 1), (scoop, 1)):
         closed = repair_mesh(broken, sheets="never")
         assert Surface.areas_of(closed.triangles[closed.kind == CAP]).sum() > 0.25 * broken.area
-        assert repair_mesh(broken).report.steps["sheets"] == sheets
+        assert repair_mesh(trimesh.util.concatenate([broken, rest])).report.steps["sheets"] == sheets
 
 
 @pytest.mark.parametrize(("how", "volume", "centre", "inertia"), [("missing", 0.015, 0.003, 0.01), ("hole", 0.06, 0.015, 0.08)])
