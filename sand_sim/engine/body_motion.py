@@ -6,7 +6,7 @@ import warp as wp
 
 from sand_sim.engine.adding import build_add
 from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_TOO_FAST
-from sand_sim.engine.free_rotation import ease_of, rotate_freely, spin_of
+from sand_sim.engine.free_rotation import ease_of, mean_spin, rotate_freely, spin_of
 from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.prefetch import build_fetch_grain, build_prefetch
 from sand_sim.engine.recipe import Recipe
@@ -168,12 +168,13 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
             remainder[b] = left
             body_place[b] = whole4(x, y, z, at[3])
             ease = ease_of(inertia[b])
-            turned = rotate_freely(turn[b], turning, ease, wp.float64(dt))
+            before = turn[b]
+            turned = rotate_freely(before, turning, ease, wp.float64(dt))
             turn[b] = turned
             axes = wp.quat_to_matrix(turned)
             omega_d = spin_of(axes, turning_now, ease)
             omega = vec3(real(omega_d[0]), real(omega_d[1]), real(omega_d[2]))
-            past_d = spin_of(axes, turning, ease)
+            past_d = mean_spin(before, turned, wp.float64(dt))
             past = vec3(real(past_d[0]), real(past_d[1]), real(past_d[2]))
             rotation = mat33(axes)
             for m in range(first, last):

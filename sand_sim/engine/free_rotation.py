@@ -69,3 +69,15 @@ def rotate_freely(turn: wp.quatd, momentum: wp.vec3d, ease: wp.vec3d, dt: wp.flo
 def spin_of(axes: wp.mat33d, momentum: wp.vec3d, ease: wp.vec3d) -> wp.vec3d:
     """Angular velocity [rad/s] in the world frame of a body whose principal axes are the columns of a matrix."""
     return axes * wp.cw_mul(wp.transpose(axes) * momentum, ease)
+
+
+@wp.func
+def mean_spin(before: wp.quatd, after: wp.quatd, dt: wp.float64) -> wp.vec3d:
+    """Angular velocity [rad/s] between two orientations, world frame: ``x_2 - x_1 = dt w x (x_1 + x_2) / 2`` for all arms x.
+
+    Cayley's form of a rotation. Of a body that is not round the angular momentum of the middle of a step with the axes of its end
+    would be off by what the axes turn by in half a step.
+    """
+    by = after * wp.quat_inverse(before)
+    scale = wp.float64(2.0) / (by[3] * dt)
+    return wp.vec3d(by[0] * scale, by[1] * scale, by[2] * scale)
