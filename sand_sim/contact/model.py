@@ -55,6 +55,11 @@ class ContactModel:
         return bool(self.memory)
 
     @property
+    def springs(self) -> bool:
+        """Whether contacts remember how they have slipped, rolled or twisted."""
+        return any(self.laws[slot].memory for slot in ("tangential", "rolling", "twisting"))
+
+    @property
     def rotation(self) -> bool:
         """Whether contacts can turn a sphere."""
         return any(law.rotation for law in self.laws.values())

@@ -172,10 +172,12 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
             turned = rotate_freely(before, turning, ease, wp.float64(dt))
             turn[b] = turned
             axes = wp.quat_to_matrix(turned)
-            omega_d = spin_of(axes, turning_now, ease)
-            omega = vec3(real(omega_d[0]), real(omega_d[1]), real(omega_d[2]))
             past_d = mean_spin(before, turned, wp.float64(dt))
             past = vec3(real(past_d[0]), real(past_d[1]), real(past_d[2]))
+            omega = past
+            if wp.static(verlet):
+                omega_d = spin_of(axes, turning_now, ease)
+                omega = vec3(real(omega_d[0]), real(omega_d[1]), real(omega_d[2]))
             rotation = mat33(axes)
             for m in range(first, last):
                 i = sure(sphere_at[sure(m)])
@@ -189,13 +191,14 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
                 if wp.dot(leap, leap) > real(0.25) * real(was[3]) * real(was[3]):
                     wp.atomic_or(fault, 0, wp.static(FAULT_TOO_FAST))
                 place[i] = whole4(u, v, w, was[3])
-                carried = now + wp.cross(omega, arm)
+                # With the arm that it had in the middle of the step.
+                carried = velocity + wp.cross(past, arm - wp.cross(past, arm) * (real(0.5) * dt))
+                if wp.static(verlet):
+                    sphere_half_motion[i] = carried
+                    sphere_half_spin[i] = past
+                    carried = now + wp.cross(omega, arm)
                 motion[i] = vec4(carried[0], carried[1], carried[2], motion[i][3])
                 spin[i] = vec4(omega[0], omega[1], omega[2], spin[i][3])
-                if wp.static(verlet):
-                    # The arm in the middle of the step.
-                    sphere_half_motion[i] = velocity + wp.cross(past, arm - wp.cross(past, arm) * (real(0.5) * dt))
-                    sphere_half_spin[i] = past
                 began = origin[i]
                 moved = vec3(real(u - began[0]), real(v - began[1]), real(w - began[2]))
                 if wp.dot(moved, moved) > real(began[3]) * real(began[3]):

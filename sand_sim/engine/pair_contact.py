@@ -60,12 +60,13 @@ def build_pair_contact(recipe: Recipe) -> wp.Function:
     """Warp function that makes a ``Contact`` of two grains, and half the overlap [m] by which their arms are shorter.
 
     It is given the excess, where a is from b and both radii [quantum], the velocity of a relative to b and both spins now and,
-    named past, over the last step, both masses, the quantum [m] and the step [s].
+    named past, over the last step, both masses, the quantum [m] and the step [s]. Where none are kept for the last step, those of
+    now are.
     """
     precision, rotation = recipe.precision, recipe.rotation
     real, vec3, whole, whole3 = precision.real, precision.vec3, precision.whole, precision.whole3
     direction, meeting = build_direction(precision), build_meeting(precision)
-    drifting, halves = build_drifting(precision), recipe.halves
+    drifting, springs, halves = build_drifting(precision), recipe.springs, recipe.halves
 
     @wp.func
     def pair_contact(
@@ -96,7 +97,11 @@ def build_pair_contact(recipe: Recipe) -> wp.Function:
         radius = radius_a * radius_b / (span * quantum)
         mass = mass_a * mass_b / (mass_a + mass_b)
         met = meeting(normal, overlap, slip, spin_a - spin_b, radius, wp.min(radius_a, radius_b), mass)
-        if wp.static(halves):
+        if wp.static(springs):
+            if wp.static(not halves):
+                past = velocity
+                past_a = spin_a
+                past_b = spin_b
             lag = (past - normal * wp.dot(past, normal)) * (real(0.5) * dt / (radius_a + radius_b))
             drift = past - wp.cross(past_a * (radius_a - half) + past_b * (radius_b - half), normal - lag)
             met = drifting(met, drift, past_a - past_b, lag)

@@ -39,9 +39,14 @@ class Recipe:
         return self.bodies or self.contact.rotation
 
     @property
+    def springs(self) -> bool:
+        """Whether contacts have springs that grow by how grains move and turn."""
+        return self.contact.springs
+
+    @property
     def halves(self) -> bool:
         """Whether springs grow by velocities of half steps that are kept beside those of now."""
-        return self.history and self.integrator == VERLET
+        return self.springs and self.integrator == VERLET
 
     @property
     def history(self) -> bool:

@@ -137,7 +137,7 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     from_anchor, nearest = build_from_anchor(precision, surfaces), build_nearest(surfaces)
     surface_of, (_, _, sphere_at) = build_surface_of(recipe), build_sphere_at()
     meeting, acts = build_meeting(precision), build_acts(recipe)
-    drifting, halves = build_drifting(precision), recipe.halves
+    drifting, springs, halves = build_drifting(precision), recipe.springs, recipe.halves
     act, release, fetch_grain = *build_act(recipe, measuring), build_fetch_grain(recipe)
     rough, moving, curved = ROUGH in surfaces, PLUNGER in surfaces, bool(surfaces & {CYLINDER, SHELL})
 
@@ -217,9 +217,12 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     turning = vec3(spin_i[0], spin_i[1], spin_i[2])
                     velocity -= wp.cross(turning, normal) * (radius - share * overlap)
                 met = meeting(normal, overlap, velocity, turning, law_radius, least, mass)
-                if wp.static(halves):
-                    past = half_motion[i] - of_wall
-                    turned = half_spin[i]
+                if wp.static(springs):
+                    past = vec3(of_i[0], of_i[1], of_i[2]) - of_wall
+                    turned = turning
+                    if wp.static(halves):
+                        past = half_motion[i] - of_wall
+                        turned = half_spin[i]
                     lag = vec3(real(0.0))
                     if wp.static(curved):
                         half_way = past * (real(0.5) * dt / quantum)

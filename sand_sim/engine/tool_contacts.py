@@ -150,7 +150,8 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     shape_type, state_type = tool_types(precision)
     from_tool, direction = build_from_tool(precision), build_direction(precision)
     meeting, acts = build_meeting(precision), build_acts(recipe)
-    drifting, halves, smooth = build_drifting(precision), recipe.halves, recipe.smooth_tools
+    drifting, springs, halves = build_drifting(precision), recipe.springs, recipe.halves
+    smooth = recipe.smooth_tools
     act, release = build_act(recipe, measuring)
 
     @kernel
@@ -222,14 +223,19 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     turning += spin_i
                     velocity -= wp.cross(spin_i, normal) * (radius - half)
                 met = meeting(normal, overlap, velocity, turning, law_radius, least, of_i[3])
-                if wp.static(halves):
-                    past = half_motion[i] - state.velocity
+                if wp.static(springs):
+                    past = vec3(of_i[0], of_i[1], of_i[2])
+                    turned = vec3(spin[i][0], spin[i][1], spin[i][2])
+                    if wp.static(halves):
+                        past = half_motion[i]
+                        turned = half_spin[i]
+                    past -= state.velocity
                     lag = wp.cross(state.spin, normal) * (real(0.5) * dt)
                     if shape.radius > real(0.0):
                         lag = past - wp.cross(state.spin, arm)
                         lag = (lag - normal * wp.dot(lag, normal)) * (real(0.5) * dt / reach)
-                    past -= wp.cross(state.spin, point) + wp.cross(half_spin[i], normal - lag) * (radius - half)
-                    met = drifting(met, past, half_spin[i] - state.spin, lag)
+                    past -= wp.cross(state.spin, point) + wp.cross(turned, normal - lag) * (radius - half)
+                    met = drifting(met, past, turned - state.spin, lag)
                 kind = int(0)
                 if wp.static(materials):
                     kind = material[i]

@@ -9,7 +9,8 @@ from sand_sim.playing import commands_at
 GRAVITY, TURNS = 9.81, 30.0  # [m/s^2], [rad/s] around the cylinder
 
 
-def test_ball_that_runs_round_in_an_upright_cylinder_comes_up_again(make_world):
+@pytest.mark.parametrize("integrator", ["velocity_verlet", "symplectic_euler"])
+def test_ball_that_runs_round_in_an_upright_cylinder_comes_up_again(make_world, integrator):
     """The golfer's dilemma (Gualtieri et al. 2006, Am. J. Phys. 74, 497): ``z = -g / (q W^2) (1 - cos(W sqrt(q / (1 + q)) t))``.
 
     q is the inertia over ``m arm^2``, 2/5 for a rigid ball; this one lies in the wall by 0.2 % of its radius.
@@ -31,6 +32,7 @@ def test_ball_that_runs_round_in_an_upright_cylinder_comes_up_again(make_world):
         ],
         domain={"low": [-0.1, -0.1, -0.3], "high": [0.1, 0.1, 0.3]},
         contact={"tangential": "mindlin"},
+        integrator=integrator,
         threads=1,
     )
     inertia = 0.4 * (radius / arm) ** 2
@@ -45,8 +47,10 @@ def test_ball_that_runs_round_in_an_upright_cylinder_comes_up_again(make_world):
     assert abs(moving.dissipated) < 1e-5 * moving.kinetic
 
 
-@pytest.mark.parametrize("precision", ["single", "double"])
-def test_two_stuck_grains_that_turn_about_each_other_and_spin_keep_their_energy(make_world, precision):
+@pytest.mark.parametrize(
+    ("precision", "integrator"), [("single", "velocity_verlet"), ("double", "velocity_verlet"), ("double", "symplectic_euler")]
+)
+def test_two_stuck_grains_that_turn_about_each_other_and_spin_keep_their_energy(make_world, precision, integrator):
     """No slip, no loss: all that moves is rigid."""
     radius, spin = 1e-3, np.array([200.0, 0.0, 200.0])
     arm = radius * (1.0 - 1e-3)
@@ -62,6 +66,7 @@ def test_two_stuck_grains_that_turn_about_each_other_and_spin_keep_their_energy(
         numbers={"adhesion": 1.0},
         contact={"cohesion": "dmt"},
         precision=precision,
+        integrator=integrator,
         domain={"low": [-0.01] * 3, "high": [0.01] * 3},
         threads=1,
     )
@@ -71,7 +76,8 @@ def test_two_stuck_grains_that_turn_about_each_other_and_spin_keep_their_energy(
     assert abs(health.dissipated) < 1e-4 * health.kinetic
 
 
-def test_a_grain_that_sticks_to_a_turning_tool_and_spins_on_it_keeps_its_energy(make_world, tmp_path):
+@pytest.mark.parametrize("integrator", ["velocity_verlet", "symplectic_euler"])
+def test_a_grain_that_sticks_to_a_turning_tool_and_spins_on_it_keeps_its_energy(make_world, tmp_path, integrator):
     """It swings up and down the face, as the golfer's ball, and nothing slips."""
     trimesh.creation.box((0.02, 0.02, 0.02)).export(tmp_path / "box.stl")
     radius, turning, young, poisson = 1e-3, 50.0, 1e8, 0.25
@@ -99,6 +105,7 @@ def test_a_grain_that_sticks_to_a_turning_tool_and_spins_on_it_keeps_its_energy(
         domain={"low": [-0.05] * 3, "high": [0.05] * 3},
         tools={"box": tool | {"max_speed": 2.0, "trajectory": way}},
         frame_rate=1000,
+        integrator=integrator,
         threads=1,
     )
     lost = []

@@ -50,7 +50,6 @@ class ReferenceDem:
                 c = {"normal": normal, "overlap": overlap, "velocity": at_i - at_j, "spin": self.w[i] - self.w[j]}
                 past, roll = hv[i] - hv[j], hw[i] - hw[j]
                 lag = 0.5 * self.dt * (past - normal * (past @ normal)) / (self.r[i] + self.r[j])
-                lag *= self.integrator == "velocity_verlet"
                 drift = past - np.cross(arm_i * hw[i] + arm_j * hw[j], normal - lag)
                 c |= {"drift": drift, "roll": roll + lag * (roll @ normal) - normal * (roll @ lag)}
                 c["radius"] = self.r[i] * self.r[j] / (self.r[i] + self.r[j])
