@@ -45,7 +45,7 @@ class Plungers:
         number: how many.
         drives: ``Plunger`` structs, shape (plungers,).
         states: ``PlungerState`` structs, shape (plungers,).
-        engaged: whether they move yet, int, shape (1,).
+        engaged: whether they move yet, int, shape (1,): 0 no, 1 from the next step on, 2 yes.
     """
 
     def __init__(self, drives: list, device: str):
@@ -111,6 +111,8 @@ def advance_plungers(
 ):
     """Sum the forces and move all plungers by one step, as the grains: ``w += a dt``, ``x += w dt``, ``v = w + a dt/2``.
 
+    The first step takes ``w += a dt/2``.
+
     The work of a force is that over half the step before and half the step after.
 
     Raises the flag ``moved`` if one has moved farther than half the skin [quantum] since the contact lists were made.
@@ -129,8 +131,11 @@ def advance_plungers(
             before = state.velocity * dt
             if drive.pressed != 0:
                 gained = (drive.force + total) / drive.mass * dt
+                half = wp.float64(0.5) * gained
+                if engaged[0] == 1:
+                    gained = half
                 state.velocity = wp.clamp(state.velocity + gained, -drive.max_speed, drive.max_speed)
-                state.seen = wp.clamp(state.velocity + wp.float64(0.5) * gained, -drive.max_speed, drive.max_speed)
+                state.seen = wp.clamp(state.velocity + half, -drive.max_speed, drive.max_speed)
             reached = state.offset + state.velocity * dt
             if wp.abs(reached) >= drive.travel and state.velocity * state.offset >= wp.float64(0.0):
                 reached = wp.clamp(reached, -drive.travel, drive.travel)
@@ -144,6 +149,8 @@ def advance_plungers(
             if state.travelled * inverse_quantum > wp.float64(0.5) * skin[0]:
                 moved[0] = 1
         states[k] = state
+    if engaged[0] == 1:
+        engaged[0] = 2
 
 
 @kernel

@@ -50,6 +50,26 @@ def test_plunger_gives_a_stack_the_right_momentum(make_world, precision, toleran
     assert report.velocity == pytest.approx([0.0, 0.0, speed])
 
 
+def test_a_pressed_plunger_that_meets_nothing_moves_as_a_free_mass(make_world):
+    """``F t^2 / 2 M``, from the first step on."""
+    force, mass = 1.0, 0.1
+    world = make_world(
+        [[0.0, 0.0, 0.005]],
+        0.005,
+        friction=0.0,
+        boundaries=[*floor(), plunger(point=(0.0, 0.0, 0.4), normal=(0.0, 0.0, -1.0), force=force, mass=mass, max_speed=5.0)],
+        domain=FREE,
+        time_step=1e-5,
+        force_time_step=True,
+        threads=1,
+    )
+    for steps in (1, 99):
+        world.step(steps)
+        report = world.observe().wall("plunger")
+        assert 0.4 - report.position[2] == pytest.approx(0.5 * force / mass * world.time**2, rel=1e-6)
+        assert -report.velocity[2] == pytest.approx(force / mass * world.time, rel=1e-9)
+
+
 def test_elastic_grain_leaves_a_plunger_at_twice_its_velocity(make_world):
     """It starts far away and at rest, so that nothing but the plunger's own travel can renew the contact lists."""
     speed = 2.0
