@@ -63,7 +63,8 @@ class ToolModel:
     def holds(self, points: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Whether world points, shape (n, 3), are inside the mesh's bounding box at a pose of the tool, shape (n,)."""
         low, high = self.mesh.bounds
-        inside = np.linalg.norm(points - position, axis=1) < self.extent
+        # The corners of the box may lie farther out than any point of the tool.
+        inside = np.linalg.norm(points - position, axis=1) < np.linalg.norm(np.maximum(np.abs(low), np.abs(high)))
         local = rotation.rotate(rotation.inverse(orientation), points[inside] - position)
         inside[inside] = np.all((local > low) & (local < high), axis=1)
         return inside

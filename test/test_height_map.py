@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 from clouds import cloud_of
 from scenes import write_small_scene
 from timing import quickest, sorting
@@ -80,6 +81,19 @@ def test_a_tool_knows_which_grains_are_in_it(tmp_path):
     turn = np.array([0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
     world_points = np.column_stack([-points[:, 1], points[:, 0], points[:, 2]]) + [1.0, 2.0, 3.0]
     assert model.holds(world_points, np.array([1.0, 2.0, 3.0]), turn).tolist() == [True, True, False, False]
+
+
+def test_a_tool_carries_what_lies_in_the_far_corner_of_its_box_too(tmp_path):
+    corners, faces = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    trimesh.Trimesh(0.02 * corners, faces).export(tmp_path / "wedge.stl")
+    scene = write_small_scene(tmp_path)
+    scene.write_text(scene.read_text().replace("plate.stl", "wedge.stl"))
+    position = np.array([0.015, 0.015, 0.1])  # where no grain is
+    model = World(load_scene(scene)).tools[0]
+    inside = 0.02 * np.array([[0.97, 0.97, 0.97], [0.9, 0.95, 0.5], [0.1, 0.1, 0.1]])
+    assert model.holds(position + inside, position, np.array([0.0, 0.0, 0.0, 1.0])).all()
+    assert np.linalg.norm(inside[0]) > model.extent  # beyond every point of the tool
+    assert not model.holds(position + 0.021 * np.eye(3), position, np.array([0.0, 0.0, 0.0, 1.0])).any()
 
 
 @pytest.mark.parametrize(("cell", "shape"), [(0.0, (2, 2)), (np.nan, (2, 2)), (0.1, (0, 2))])
