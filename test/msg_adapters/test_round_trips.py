@@ -9,7 +9,7 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, TransformStamped, TwistStamped
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import Image, PointCloud2
+from sensor_msgs.msg import Image, PointCloud2, PointField
 
 from msg_adapters.builtin_interfaces import stamp_to_time, time_to_stamp
 from msg_adapters.diagnostic_msgs import health_to_diagnostics
@@ -33,6 +33,11 @@ from sand_sim.border import Frame, GrainCloud, Health, ToolContacts, ToolPose, T
 def test_times(seconds):
     assert stamp_to_time(time_to_stamp(seconds)) == pytest.approx(seconds, abs=6e-10)
     assert time_to_stamp(seconds).nanosec < 1_000_000_000
+
+
+def test_times_go_to_the_nearest_nanosecond():
+    stamps = [time_to_stamp(1e-3 * k) for k in range(3000)]  # of which many lie a little below what is meant
+    assert [10**9 * stamp.sec + stamp.nanosec for stamp in stamps] == [10**6 * k for k in range(3000)]
 
 
 @pytest.mark.parametrize("time_of_pose", [None, 0.25])
@@ -85,7 +90,7 @@ def grains(number):
         velocity=random.normal(size=(number, 3)).astype(np.float32),
         spin=np.zeros((number, 3), np.float32),
         radius=random.uniform(0.001, 0.002, number).astype(np.float32),
-        mass=np.ones(number, np.float32),
+        mass=random.uniform(0.1, 0.2, number).astype(np.float32),
         orientation=np.tile([0.0, 0.0, 0.0, 1.0], (number, 1)),
     )
 
@@ -111,14 +116,37 @@ def test_clouds_have_the_fields_that_are_asked_for():
     assert points.dtype["id"] == np.uint32
 
 
+def test_clouds_are_what_their_headers_say():
+    """Read as strangers do: by offset, type, step and order of bytes."""
+    cloud = grains(7)
+    message = grains_to_cloud(cloud, 2.0, "world", ("id", "velocity", "mass", "position", "radius", "speed"))
+    assert (message.height, message.width, message.is_dense) == (1, 7, True)  # no point is missing
+    kinds = {PointField.FLOAT32: "f4", PointField.UINT32: "u4"}
+    order, data = "><"[not message.is_bigendian], bytes(message.data)
+    found = {
+        field.name: np.ndarray(7, order + kinds[field.datatype], data, field.offset, (message.point_step,))
+        for field in message.fields
+    }
+    meant = {"id": cloud.identity, "mass": cloud.mass, "radius": cloud.radius, "speed": np.linalg.norm(cloud.velocity, axis=1)}
+    for k, axis in enumerate("xyz"):
+        meant |= {axis: cloud.position[:, k], f"v{axis}": cloud.velocity[:, k]}
+    assert found.keys() == meant.keys()
+    for name, values in meant.items():
+        assert found[name] == pytest.approx(values, rel=1e-6), name
+
+
 def test_heights():
     heights = np.array([[0.1, np.nan, 0.3], [0.4, 0.5, 0.6]], np.float32)
     message = deserialize_message(serialize_message(heights_to_image(heights, 2.0, "world")), Image)
     assert (message.height, message.width, message.encoding, message.step) == (2, 3, "32FC1", 12)
     assert np.array_equal(image_to_heights(message), heights, equal_nan=True)
+    order = "><"[not message.is_bigendian]
+    assert np.ndarray((2, 3), order + "f4", bytes(message.data), 0, (message.step, 4)) == pytest.approx(heights, nan_ok=True)
     grid = grid_to_metadata(np.array([-0.5, 0.25]), 0.01, heights.shape)
     assert (grid.width, grid.height) == (3, 2)
-    assert (grid.origin.position.x, grid.origin.position.y) == (-0.5, 0.25)
+    assert (grid.origin.position.x, grid.origin.position.y, grid.resolution) == (-0.5, 0.25, pytest.approx(0.01))
+    turn = grid.origin.orientation
+    assert (turn.x, turn.y, turn.z, turn.w) == (0.0, 0.0, 0.0, 1.0)
 
 
 def test_contacts_are_drawn_from_their_points_along_their_forces():
@@ -131,6 +159,7 @@ def test_contacts_are_drawn_from_their_points_along_their_forces():
     assert found[:, 1] - found[:, 0] == pytest.approx(0.1 * force)
     assert len(points.points) == 5
     assert (lines.ns, lines.id != points.id, points.scale.x) == ("spade", True, 0.004)
+    assert lines.scale.x == pytest.approx(0.001)  # a quarter of it
 
 
 def test_large_clouds_do_not_go_byte_by_byte():
@@ -150,5 +179,13 @@ def test_health(doubts):
     assert values["contacts"] == "123"
     assert values["grains retired"] == "4"
     assert values["more"] == "1"
+    numbers = [float(values[f"{name} energy{of} [J]"]) for name, of in (("kinetic", ""), ("potential", " against start"))]
+    numbers += [float(values[f"{name} [J]"]) for name in ("elastic energy", "work of tools", "dissipated")]
+    assert numbers == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert [float(values[name]) for name in ("time step [s]", "largest overlap / radius", "fastest grain [m/s]")] == [
+        1e-5,
+        0.02,
+        0.5,
+    ]
     if doubts:
         assert doubts[0] in status.message
