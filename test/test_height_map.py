@@ -7,7 +7,7 @@ from clouds import cloud_of
 from scenes import write_small_scene
 from timing import quickest, sorting
 
-from sand_sim import World, load_scene
+from sand_sim import World, load_scene, rotation
 from sand_sim.height_map import bed_grid, footprint_grid, make_height_map
 
 
@@ -91,9 +91,22 @@ def test_a_tool_carries_what_lies_in_the_far_corner_of_its_box_too(tmp_path):
     position = np.array([0.015, 0.015, 0.1])  # where no grain is
     model = World(load_scene(scene)).tools[0]
     inside = 0.02 * np.array([[0.97, 0.97, 0.97], [0.9, 0.95, 0.5], [0.1, 0.1, 0.1]])
-    assert model.holds(position + inside, position, np.array([0.0, 0.0, 0.0, 1.0])).all()
     assert np.linalg.norm(inside[0]) > model.extent  # beyond every point of the tool
-    assert not model.holds(position + 0.021 * np.eye(3), position, np.array([0.0, 0.0, 0.0, 1.0])).any()
+    for angles in ([0.0, 0.0, 0.0], [0.3, -0.5, 2.0]):
+        turn = rotation.from_rpy(*angles)
+        axes = trimesh.transformations.euler_matrix(*angles)[:3, :3]
+        assert model.holds(position + inside @ axes.T, position, turn).all()
+        assert not model.holds(position + 0.021 * axes.T, position, turn).any()
+        assert not model.holds(position - 0.001 * axes.T, position, turn).any()
+
+
+def test_a_grid_lies_around_the_middle_of_what_it_covers():
+    low, high = np.array([-0.3, 0.1]), np.array([0.75, 0.32])
+    corner, (rows, columns) = footprint_grid(low, high, 0.1)
+    assert (rows, columns) == (3, 11)  # along y, along x
+    assert corner + 0.05 * np.array([columns, rows]) == pytest.approx(0.5 * (low + high))
+    assert np.all(corner <= low)
+    assert np.all(corner + 0.1 * np.array([columns, rows]) >= high)
 
 
 @pytest.mark.parametrize(("cell", "shape"), [(0.0, (2, 2)), (np.nan, (2, 2)), (0.1, (0, 2))])
