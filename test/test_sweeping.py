@@ -102,6 +102,22 @@ def test_ground_is_what_lies_under_the_surface(bed, blade):
     assert SweptGround(cloud_of(np.zeros((0, 3)), 0.1), [blade], [(np.zeros(3), NO_TURN)]).volumes[0] == 0.0
 
 
+def test_ground_of_a_bed_that_is_not_level_lies_under_each_of_its_places(blade):
+    """Columns of spheres on a grid, as high as chance wills, on a floor that is a step higher on one side."""
+    random = np.random.default_rng(3)
+    bottom = np.array([0, 0, 0, 2, 2])[:, None] + np.zeros((5, 7), int)
+    top = bottom + random.integers(2, 6, (5, 7))
+    z = np.arange(8)
+    x, y, z = np.nonzero((z >= bottom[:, :, None]) & (z < top[:, :, None]))
+    bed = cloud_of((np.column_stack([x, y, z]) + 0.5) * DIAMETER, 0.5 * DIAMETER)
+    found = SweptGround(bed, [blade], [(np.array([0.0, 0.0, 0.5]), NO_TURN)])
+    assert found.cell == pytest.approx(DIAMETER)
+    assert found.low == pytest.approx(np.zeros(3), abs=1e-9)
+    expected = np.zeros((5, 7, int(top.max())), bool)
+    expected[x, y, z] = True
+    assert np.array_equal(found.ground, expected)
+
+
 def test_world_reports_and_keeps_it(tmp_path):
     world = World(load_scene(write_small_scene(tmp_path)))
     assert world.observe().tool("plate").swept == 0.0
