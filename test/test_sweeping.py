@@ -118,6 +118,26 @@ def test_ground_of_a_bed_that_is_not_level_lies_under_each_of_its_places(blade):
     assert np.array_equal(found.ground, expected)
 
 
+def test_cells_of_which_grains_cover_less_than_half_are_no_ground(blade):
+    """One sphere in the middle of each of two cells, and one where four cells meet, a quarter of which lies over each."""
+    bed = cloud_of(DIAMETER * np.array([[0.5, 0.5, 0.5], [3.5, 1.5, 0.5], [2.0, 1.0, 0.5]]), 0.5 * DIAMETER)
+    found = SweptGround(bed, [blade], [(np.array([0.0, 0.0, 0.5]), NO_TURN)])
+    assert np.argwhere(found.ground).tolist() == [[0, 0, 0], [3, 1, 0]]
+
+
+def test_another_body_has_swept_what_it_lies_in(bed, blade):
+    size, place = np.array([0.063, 0.044, 0.31]), np.array([0.302, 0.001, 0.1])
+    mesh = trimesh.creation.box(size)
+    block = ToolModel(Tool("block", "", "steel", PARTICLE, contact="smooth"), mesh, blade.body, np.asarray(mesh.triangles))
+    ground = SweptGround(bed, [blade], [(place, NO_TURN)])
+    assert ground.volumes[0] == 0.0
+    ground.set_tools([block])
+    middles = ground.low + (np.argwhere(ground.ground) + 0.5) * ground.cell - place
+    lies_in = np.all(np.abs(middles) < 0.5 * size, axis=1).sum()
+    assert lies_in > 100
+    assert ground.volumes[0] == pytest.approx(lies_in * DIAMETER**3)
+
+
 def test_world_reports_and_keeps_it(tmp_path):
     world = World(load_scene(write_small_scene(tmp_path)))
     assert world.observe().tool("plate").swept == 0.0
