@@ -171,6 +171,19 @@ def test_in_lockstep_the_first_of_one_stamp_counts(tmp_path):
     assert driven.courses.alike == 0
 
 
+def test_in_lockstep_time_goes_as_far_as_the_stamps_of_all_tools_that_are_driven(tmp_path):
+    plate = {"mesh": "plate.stl", "material": "steel", "particle_radius": 0.003}
+    tools = {name: plate | {"pose": {"position": [0.0, 0.0, height]}} for name, height in (("a", 0.1), ("b", 0.15), ("c", 0.2))}
+    world = World(load_scene(write_small_scene(tmp_path, tools=tools)))
+    courses, errors = Courses(world, True, StampRules()), []
+    known = [courses.promised]
+    for tool, at in (("a", 0.04), ("b", 0.02), ("b", 0.06), ("a", 0.05)):  # nobody drives c
+        courses.take([ToolPose(tool, world.observe().tool(tool).position, NO_TURN, at)], errors.append)
+        known.append(courses.promised)
+    assert not errors
+    assert known == [-np.inf, 0.04, 0.02, 0.04, 0.05]
+
+
 def test_after_a_stray_stamp_a_pose_without_one_begins_anew(driven, tmp_path):
     driven.take(pose(0.0, 50.0), pose(0.01, 0.1))
     assert driven.rejected == {"out_of_order": 1}

@@ -1,6 +1,8 @@
 """States of a running simulation: saved, loaded, kept and resumed, with the commands that wait."""
 
+import json
 import threading
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -9,6 +11,8 @@ from scenes import write_small_scene
 from sand_sim import ToolPose, World, load_scene
 from sand_sim.checkpoint import CheckpointError, read_checkpoint
 from sand_sim.checkpoints import CheckpointFolder
+from sand_sim.courses import Courses, StampRules
+from sand_sim.pending import pack_told, unpack_told
 from sand_sim.playing import commands_at, frame_times
 from sand_sim.simulation import Simulation
 from sand_sim.sinks.run_log import RunLog
@@ -105,6 +109,23 @@ def test_waiting_poses_are_part_of_a_state(scene, uninterrupted, tmp_path):
         running.wait_until(scene.duration)
         assert running.simulation.rejected == {"not_finite": 1}
         assert_equal(running, uninterrupted)
+
+
+def test_what_tools_were_told_and_what_was_counted_come_back(scene):
+    world = World(scene)
+    courses = Courses(world, False, StampRules())
+    courses.limited = 7
+    course = courses.by_tool["plate"]
+    course.last_stamp, course.followed_stamp, course.last_taken, course.promised = 0.375, 0.125, -np.inf, 0.5
+    course.waiting.append(ToolPose("plate", np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.6, 0.0, 0.8]), 0.5))
+    packed = json.loads(json.dumps(pack_told(courses, Counter({"late": 2}), 0.75 * world.frame_steps * world.time_step)))
+    by_tool, rejected, limited, frame_end = unpack_told(packed, world)
+    assert (rejected, limited) == ({"late": 2}, 7)
+    assert frame_end == pytest.approx(0.75 * world.frame_steps * world.time_step)
+    waiting, expected = by_tool["plate"].waiting.pop(), course.waiting.pop()
+    assert by_tool == courses.by_tool
+    for name, value in vars(expected).items():
+        assert np.array_equal(getattr(waiting, name), value), name
 
 
 def test_a_state_is_loaded_into_the_running_simulation(scene, uninterrupted, tmp_path):
