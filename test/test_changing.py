@@ -116,6 +116,50 @@ def test_senseless_grains_are_refused_and_change_nothing(tmp_path, asked, reason
     assert same_state(world.save(), before)
 
 
+def test_new_grains_may_be_as_fast_as_half_a_radius_a_step(tmp_path):
+    world = World(load_scene(write_small_scene(tmp_path)))
+    limit = 0.5 * SMALL / world.time_step
+    with pytest.raises(CommandError, match=r"1 of 2 grains \(first at \[0\.1, 0\.1, 0\.2\] m\) are too fast"):
+        world.add_grains([CLEAR[0], [0.1, 0.1, 0.2]], SMALL, velocity=[[0.0, 0.0, 0.0], [0.0, 1.01 * limit, 0.0]])
+    world.add_grains([CLEAR[0]], SMALL, velocity=[0.0, 0.99 * limit, 0.0])
+    world.step()  # is not taken for a run that blows up
+
+
+def test_new_grains_are_as_heavy_and_as_soft_as_their_material(tmp_path):
+    parsed = yaml.safe_load(write_small_scene(tmp_path).read_text())
+    np.savez(tmp_path / "one.npz", position=[[0.1, -0.1, 0.1]], radius=[SMALL])
+    zinc, sand, steel = {"density": 7100.0, "young": 2e6, "poisson": 0.4}, *parsed["materials"].values()
+    materials = {"sand": sand, "steel": steel, "zinc": zinc}  # grains' are numbered before that of walls
+    numbers = {"restitution": 0.3, "friction": 0.3}
+    pairs = [*parsed["pairs"], *({"between": ["zinc", other]} | numbers for other in materials)]
+    fills = [*parsed["fills"], {"material": "zinc", "file": "one.npz"}]
+    world = World(read_scene(parsed | {"materials": materials, "pairs": pairs, "fills": fills}, tmp_path))
+    for material in ("sand", "zinc"):
+        (number,) = world.add_grains([[0.1 + 0.05 * (material == "zinc"), 0.1, 1.21 * SMALL]], 1.2 * SMALL, material)
+        grains = world.observe().grains
+        density = grains.mass[number] / (4.0 / 3.0 * np.pi * (1.2 * SMALL) ** 3)
+        assert density == pytest.approx(materials[material]["density"], rel=1e-6)
+    with pytest.raises(CommandError, match="known are"):
+        world.add_grains([CLEAR[0]], SMALL)
+    world.step(round(0.4 / world.time_step))
+    low, weight = 1.2 * SMALL - world.observe().grains.position[number, 2], grains.mass[number] * 9.81
+    young = 1.0 / sum((1.0 - one["poisson"] ** 2) / one["young"] for one in (zinc, steel))
+    assert low == pytest.approx((0.75 * weight / (young * np.sqrt(1.2 * SMALL))) ** (2.0 / 3.0), rel=0.01)  # Hertz
+
+
+def test_what_has_moved_is_in_the_way_where_it_is_now(tmp_path):
+    ram = {"type": "plunger", "name": "ram", "material": "steel", "point": [0, 0, 0.2], "normal": [0, 0, -1], "velocity": 0.2}
+    world = World(load_scene(write_small_scene(tmp_path, boundaries=[ram])))
+    old, new = np.array([0.015, 0.015, 0.06]), np.array([0.05, 0.05, 0.08])
+    world.apply(ToolPose("plate", new, NO_TURN, 0.1))
+    world.step(round(0.1 / world.time_step))
+    low = 0.2 - 0.2 * world.time
+    for place, name in ((new, "tool 'plate'"), ([0.1, 0.1, low - 0.99 * SMALL], "wall 'ram'")):
+        with pytest.raises(CommandError, match=f"1 overlap {name}"):
+            world.add_grains([place], SMALL)
+    assert len(world.add_grains([old, [0.1, 0.1, low - 1.01 * SMALL]], SMALL)) == 2
+
+
 def test_touching_is_not_overlapping(tmp_path):
     world = World(load_scene(write_small_scene(tmp_path)))
     world.add_grains([[0.1, 0.1, SMALL], [0.11, 0.1, SMALL]], SMALL)
