@@ -282,10 +282,12 @@ def test_clump_on_a_slope(make_bodies, degrees, rests, duration):
 
 
 def test_mesh_body_rests_with_its_weight_on_the_floor(make_bodies, tmp_path):
-    trimesh.creation.box((0.06, 0.04, 0.02)).export(tmp_path / "brick.stl")
-    brick = {"mesh": "brick.stl", "particle_radius": 0.003, "pose": {"position": [0.0, 0.0, 0.0131]}}
+    trimesh.creation.box((60.0, 40.0, 20.0)).export(tmp_path / "brick.stl")
+    brick = {"mesh": "brick.stl", "scale": 0.001, "particle_radius": 0.003, "pose": {"position": [0.0, 0.0, 0.0131]}}
     world = make_bodies({"brick": brick}, gravity=[0.0, 0.0, -9.81], boundaries=floor(), restitution=0.2, precision="single")
     weight = 2500.0 * 0.06 * 0.04 * 0.02 * 9.81
+    above = np.array([[0.0, 0.0, 0.0131 + 0.01 + 0.003 + 0.005]])
+    assert world.assembly.bodies[0].distance(above) == pytest.approx([0.005], rel=1e-3)
     world.step(round(1.0 / world.time_step))
     observation = world.observe()
     assert observation.body("brick").mass * 9.81 == pytest.approx(weight, rel=1e-6)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sampler import load_body, sample_file
+from sampler import MeshError, load_body, sample_file, sample_mesh
 from sampler.cache import cache_folder
 
 BUCKET = Path(__file__).parents[2] / "config" / "meshes" / "bucket.stl"
@@ -55,6 +55,26 @@ def test_other_content_or_options_are_sampled_anew(box, folder):
     trimesh.creation.box((0.1, 0.06, 0.03)).export(box)
     sample_file(box, 0.004)
     assert len(list(folder.iterdir())) == 5
+
+
+def test_the_same_bytes_under_another_ending_are_another_content(box, tmp_path):
+    sample_file(box, 0.004)
+    other = tmp_path / "box.obj"
+    other.write_bytes(box.read_bytes())
+    with pytest.raises(MeshError):
+        sample_file(other, 0.004)
+
+
+def test_other_triangles_of_the_same_vertices_are_another_content():
+    square = [[0, 0], [1, 0], [1, 1], [0, 1]]
+    corners = np.array([[*place, height] for height in (0, 1) for place in square]) * [0.1, 0.06, 0.02]
+    volumes = []
+    for ring in ([0, 1, 2, 3], [0, 1, 2]):  # a box, and the prism on the one side of its diagonal
+        faces = [[0, j + 1, j] for j in ring[1:-1]] + [[4, 4 + j, 4 + j + 1] for j in ring[1:-1]]
+        for j, k in zip(ring, [*ring[1:], 0], strict=True):
+            faces += [[j, k, k + 4], [j, k + 4, j + 4]]
+        volumes.append(sample_mesh(trimesh.Trimesh(corners, faces, process=False), 0.004).volume)
+    assert volumes == pytest.approx([0.1 * 0.06 * 0.02, 0.5 * 0.1 * 0.06 * 0.02], rel=1e-6)
 
 
 def test_another_sampler_samples_anew(box, folder, monkeypatch):

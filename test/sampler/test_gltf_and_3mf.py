@@ -156,6 +156,20 @@ def test_objects_of_objects_of_3mf_are_where_they_are_wanted_also_from_other_par
     assert mesh.volume == pytest.approx(4.0 * box.volume)
 
 
+def test_transforms_of_3mf_apply_from_the_inside_out_and_may_mirror(tmp_path, box):
+    inner, outer = "0 1 0 -1 0 0 0 0 1 1 2 3", "2 0 0 0 0 1 0 1 0 0 0 5"  # of rows; neither may go before the other
+    part = f'<object id="2">{shape_3mf(box)}</object>'
+    whole = f'<object id="1"><components><component objectid="2" transform="{inner}"/></components></object>'
+    parts = {"3D/3dmodel.model": (part + whole, f'<item objectid="1" transform="{outer}"/>')}
+    mesh = read_mesh(write_3mf(tmp_path / "turned.3mf", ' unit="meter"', parts))
+    expected = np.asarray(box.vertices)
+    for transform in (inner, outer):
+        rows = np.array(transform.split(), float).reshape(4, 3)
+        expected = expected @ rows[:3] + rows[3]
+    assert mesh.bounds == pytest.approx(np.array([expected.min(axis=0), expected.max(axis=0)]))
+    assert mesh.volume == pytest.approx(2.0 * box.volume)  # not less than nothing
+
+
 @pytest.mark.parametrize(
     ("objects", "item", "reason"),
     [
