@@ -89,6 +89,39 @@ def test_single_grain_pressed_on_a_particle_follows_hertz(tmp_path):
     assert contacts.point == pytest.approx(place[None] - [[0.0, 0.0, RADIUS - 0.5 * overlap]], abs=1e-12)
 
 
+def test_each_of_several_tools_is_as_hard_as_its_own_material(tmp_path):
+    """Three plates of three materials, one of them smooth, and a grain 20 um deep in each: F = 4/3 E* sqrt(R*) d^(3/2)."""
+    trimesh.creation.box((0.06, 0.06, 0.004)).export(tmp_path / "plate.stl")
+    young, overlap, across = {"wall": 4.0 * YOUNG, "wood": 0.5 * YOUNG, "tin": 2.0 * YOUNG}, 20e-6, {}
+    place = {name: np.array([0.0, 0.1 * k, 0.03 * k]) for k, name in enumerate(young)}
+    plate = {"mesh": "plate.stl", "particle_radius": PARTICLE}
+    tools = {f"of_{name}": plate | {"material": name, "pose": {"position": at.tolist()}} for name, at in place.items()}
+    tools["of_tin"]["contact"] = "smooth"
+    domain, maker = {"low": [-0.4] * 3, "high": [0.4] * 3}, SceneMaker(tmp_path)
+
+    def make(position):
+        content = maker.scene(position, RADIUS, tools=tools, domain=domain)
+        for name, stiffness in young.items():
+            content["materials"][name] = {"density": 2500.0, "young": stiffness, "poisson": POISSON}
+        content["materials"]["grain"] = {"density": 2500.0, "young": YOUNG, "poisson": POISSON}
+        content["pairs"] += [{"between": ["grain", name], "restitution": 0.5, "friction": 0.5} for name in ("wood", "tin")]
+        return World(read_scene(content, tmp_path))
+
+    position = []
+    for model in make([[0.0, 0.0, -0.3]]).tools:
+        name, points = model.tool.material, model.body.points
+        top = points[np.argmin(np.linalg.norm(points - [0.0, 0.0, points[:, 2].max()], axis=1))]
+        across[name] = RADIUS if model.smooth else RADIUS * PARTICLE / (RADIUS + PARTICLE)
+        position.append(place[name] + (top + [0.0, 0.0, RADIUS + model.margin - overlap]))
+    world = make(position)
+    for k, name in enumerate(across):
+        contacts, stiffness = world.tool_contacts(f"of_{name}"), young[name]
+        effective = 1.0 / ((1.0 - POISSON**2) * (1.0 / YOUNG + 1.0 / stiffness))
+        force = 4.0 / 3.0 * effective * np.sqrt(across[name]) * overlap**1.5
+        assert contacts.identity.tolist() == [k]
+        assert contacts.force[0] == pytest.approx([0.0, 0.0, -force], rel=1e-3, abs=1e-6 * force)
+
+
 def test_unknown_tool_is_named(tmp_path):
     with pytest.raises(CommandError, match="'spade' is unknown; known are plate"):
         World(load_scene(write_small_scene(tmp_path))).tool_contacts("spade")
