@@ -7,6 +7,7 @@ from scenes import RIGID, floor
 
 from sand_sim import SceneError, World, read_scene, rotation
 from sand_sim.contact.damping import damping_ratio, restitution_of_damping
+from sand_sim.scene.shapes import shape_of_spheres, tetrahedron
 
 MATERIALS = {
     "stone": {"density": 2500.0, "young": 1e7, "poisson": 0.25},
@@ -211,6 +212,28 @@ def test_spheres_that_hit_at_once_bounce_less_as_documented(make_bodies, columns
     assert plate.velocity[2] / 0.5 == pytest.approx(expected, abs=0.01)
     ratio = np.sqrt(columns * rows) * damping_ratio(0.5, exponent=1.5)
     assert restitution_of_damping(1.5, np.array([ratio]))[0] == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize(("clump", "expected"), [("tetrahedron", 0.43), ("dumbbell", 0.40)])
+def test_clumps_hit_across_one_of_their_spheres_bounce_less_as_documented(make_bodies, clump, expected):
+    """They yield by turning, too, ``1 + a^2/k^2`` times as much, and are damped for their whole mass all the same."""
+    ends = {"tetrahedron": tetrahedron().centres, "dumbbell": np.array([[-2.0, 0.0, 0.0], [2.0, 0.0, 0.0]])}[clump]
+    hit, others = ends[0], ends[1:] - ends[0]
+    across = np.linalg.svd(hit[None])[2][1:]  # of the ways across, the one that is farthest from all other spheres
+    ways = [np.cos(turn) * across[0] + np.sin(turn) * across[1] for turn in np.linspace(0.0, 2.0 * np.pi, 721)]
+    way = max(ways, key=lambda one: np.linalg.norm(2.0 * one - others, axis=1).min())
+    ball = {"spheres": [[0.0, 0.0, 0.0, 0.005]], "mass": 1.0, "inertia": [1e-5] * 3, "velocity": (-0.02 * way).tolist()}
+    ball |= {"pose": {"position": (0.005 * (hit + 2.0001 * way)).tolist()}}
+    rows = 0.005 * np.column_stack([ends, np.ones(len(ends))])
+    world = make_bodies({"clump": {"spheres": rows.tolist()}, "ball": ball}, contact={"tangential": "none"}, friction=0.0)
+    while world.time < 1e-3 or len(world.grain_contacts()):
+        world.step(20)
+    seen = world.observe()
+    body = seen.body("clump")
+    away = body.velocity + np.cross(body.spin, rotation.rotate(body.orientation, 0.005 * hit)) - seen.body("ball").velocity
+    assert -(away @ way) / 0.02 == pytest.approx(expected, abs=0.01)
+    ratio = damping_ratio(0.5, exponent=1.5) * np.sqrt(1.0 + hit @ hit / shape_of_spheres(ends, np.ones(len(ends))).gyration[2])
+    assert restitution_of_damping(1.5, np.array([ratio]))[0] == pytest.approx(expected, abs=0.005)
 
 
 @pytest.mark.parametrize(("precision", "tolerance"), [("double", 1e-12), ("single", 2e-6)])
