@@ -1,5 +1,6 @@
 """What goes in and out beside poses and plain wrenches: velocities, frames, TF, filtered wrenches, contacts, heights."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -24,6 +25,7 @@ from msg_adapters.geometry_msgs import command_to_twist, frame_to_transform, wre
 from msg_adapters.sensor_msgs import cloud_to_points, image_to_heights
 from sand_sim import rotation
 from sand_sim.border import Frame, ToolVelocity
+from sand_sim.low_pass import LowPass
 from sand_sim.node import bed_outputs
 from sand_sim.node.tool_inputs import ToolInputs
 
@@ -76,6 +78,10 @@ def test_tools_tell_what_they_feel_and_carry(client, start_node):
     assert poses[-1].header.frame_id == "world"
     assert carried[-1].data == pytest.approx(report.carried, abs=1e-9)
     assert swept[-1].data == pytest.approx(report.swept, rel=1e-6, abs=1e-12)
+    last = node.simulation.request(node.simulation.world.observe).result(30.0)
+    full = replace(last, tools=(replace(report, carried=1.25, swept=2.5),))  # as such a small tool never is
+    node.simulation.request(lambda: node._tools[0].publish(full)).result(30.0)
+    client.wait_for(lambda: (carried[-1].data, swept[-1].data) == (1.25, 2.5))
 
     raw, smooth = (
         np.array([wrench_to_arrays(message)[0][2] for message in heard[-20:]]) for heard in (client.wrenches, filtered)
@@ -88,19 +94,39 @@ def test_tools_tell_what_they_feel_and_carry(client, start_node):
     pushed = contacts["fz"].sum()
     assert pushed == pytest.approx(raw[-1], rel=0.2), "of the last step, where the wrench is the mean over the frame"
     assert np.all(contacts["overlap"] > 0.0)
-    assert set(contacts["id"]) <= set(range(32))
+    seen = node.simulation.request(lambda: node.simulation.world.tool_contacts("plate")).result(30.0)
+    assert np.array_equal(contacts["id"], seen.identity)
+    for head, values in (("", seen.point), ("f", seen.force), ("n", seen.normal)):
+        columns = np.column_stack([contacts[f"{head}{axis}"] for axis in "xyz"])
+        assert columns == pytest.approx(values, rel=1e-4, abs=1e-6 * np.abs(values).max())
     client.wait_for(lambda: stamp_to_time(markers[-1].markers[0].header.stamp) > 0.59)
-    assert len(markers[-1].markers[0].points) == 2 * len(contacts)
+    lines = np.array([[p.x, p.y, p.z] for p in markers[-1].markers[0].points]).reshape(-1, 2, 3)
+    assert lines[:, 0] == pytest.approx(seen.point, rel=1e-4)
+    ways, sizes = lines[:, 1] - lines[:, 0], np.linalg.norm(seen.force, axis=1)
+    assert np.einsum("ij,ij->i", ways, seen.force) == pytest.approx(np.linalg.norm(ways, axis=1) * sizes, rel=1e-3)
 
 
-def test_a_wrench_in_the_axes_of_the_world(client, start_node):
-    start_node(pacing="lockstep", **{"tools.plate.wrench_frame": "world"})
-    upside_down = rotation.from_rpy(np.pi, 0.0, 0.0)
+@pytest.mark.parametrize("axes", ["tool", "world"])
+def test_wrenches_of_a_turned_tool_are_in_the_axes_that_are_asked_for(client, start_node, axes):
+    """Plain and filtered, against the history of the run, which has forces in the world's axes and torques in the tool's."""
+    node = start_node(pacing="lockstep", **{"tools.plate.wrench_frame": axes})
+    filtered = hear(client, WrenchStamped, f"{TOOL}/wrench_filtered")
     client.connect()
-    press(client, upside_down)
-    client.wait_for(lambda: stamp_to_time(client.wrenches[-1].header.stamp) > 0.59)
-    assert client.wrenches[-1].header.frame_id == "world"
-    assert wrench_to_arrays(client.wrenches[-1])[0][2] > 0.5, "the bed pushes up, whichever way the tool is turned"
+    client.wait_for(lambda: client.node.count_publishers(f"{TOOL}/wrench_filtered"))
+    press(client, rotation.from_rpy(np.pi, 0.0, 0.4))
+    client.wait_for(lambda: all(heard and stamp_to_time(heard[-1].header.stamp) > 0.59 for heard in (client.wrenches, filtered)))
+    history, smooth = node.recorder.log.columns(), LowPass(10.0)
+    turns = history["plate.orientation"]
+    torques = [rotation.rotate(turn, torque) for turn, torque in zip(turns, history["plate.torque"], strict=True)]
+    plain = np.stack([history["plate.force"], torques], axis=1)
+    steps = np.diff(history["time"], prepend=0.0)
+    expected = {"plain": plain[-1], "smooth": [smooth.filter(one, step) for one, step in zip(plain, steps, strict=True)][-1]}
+    assert plain[-1][0][2] > 0.5, "the bed pushes up, whichever way the tool is turned"
+    assert np.linalg.norm(plain[-1][1]) > 1e-4
+    for message, kind in ((client.wrenches[-1], "plain"), (filtered[-1], "smooth")):
+        meant = expected[kind] if axes == "world" else rotation.rotate(rotation.inverse(turns[-1]), expected[kind])
+        assert message.header.frame_id == ("world" if axes == "world" else "plate")
+        assert np.array(wrench_to_arrays(message)) == pytest.approx(meant, rel=1e-6, abs=1e-9)
 
 
 def test_heights_and_their_grid(client, start_node):
