@@ -58,6 +58,16 @@ def test_bridge_force_over_the_gap(make_world, precision):
     assert np.all(pull[gap > 1.01 * RUPTURE] == 0.0)
 
 
+def test_bridge_of_a_liquid_that_wets_less_pulls_less_and_reaches_farther(make_world):
+    """By cos(t), up to (1 + t/2) V^(1/3) for a contact angle t."""
+    angle = 0.6
+    world = pair(make_world, "capillary", RADIUS, -1e-9, 1.0, liquid=LIQUID | {"contact_angle": angle}, time_step=4e-7)
+    gap, pull = pulls(world, 400)
+    for share, force in ((0.25, 100.1e-6), (0.5, 45.6e-6)):
+        assert np.interp(share * RUPTURE, gap, pull) == pytest.approx(np.cos(angle) * force, rel=1e-2)
+    assert gap[pull > 1e-6][-1] == pytest.approx((1.0 + 0.5 * angle) * RUPTURE, rel=1e-2)
+
+
 def test_bridge_forms_on_contact_only(make_world):
     """A grain that passes within reach without touching feels nothing; one that touches is held back."""
     common = {"material": {"density": DENSITY, "young": 1e7, "poisson": POISSON}, "contact": {"cohesion": "capillary"}}
