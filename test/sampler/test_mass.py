@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from sampler import sample_body
-from sampler.mass import count_inside, integrate, joined, openness
+from sampler.mass import count_inside, integrate, is_physical, joined, openness, principal_axes
 from sampler.surface import Surface
 
 
@@ -37,6 +37,30 @@ def test_solids_are_joined_as_if_they_were_one():
     for told, exact in zip(joined([integrate(part) for part in parts]), integrate(np.concatenate(parts)), strict=True):
         assert told == pytest.approx(exact, rel=1e-12)
     assert joined([])[0] == 0.0
+
+
+def test_principal_axes_are_a_right_handed_rotation():
+    random = np.random.default_rng(4)
+    for _ in range(20):
+        turn = trimesh.transformations.random_rotation_matrix(random.random(3))[:3, :3]
+        inertia = turn @ np.diag([1.0, 2.0, 2.5]) @ turn.T
+        moments, axes = principal_axes(inertia)
+        assert moments == pytest.approx([1.0, 2.0, 2.5])
+        assert np.linalg.det(axes) == pytest.approx(1.0)
+        assert axes @ np.diag(moments) @ axes.T == pytest.approx(inertia)
+
+
+def test_what_no_solid_can_be_is_told_from_what_one_can():
+    """A box of edges a, b, c about its middle: V (b^2 + c^2)/12 and so on."""
+    low, high = np.zeros(3), np.array([1.0, 2.0, 3.0])
+    moments = 6.0 * np.array([13.0, 10.0, 5.0]) / 12.0
+    assert is_physical(6.0, 0.5 * high, np.diag(moments), low, high)
+    assert not is_physical(6.0, 0.5 * high, np.diag([1.0, 1.0, 2.1]), low, high)  # more about one axis than about both others
+    assert not is_physical(6.0, 0.5 * high, np.diag([-1.0, 5.0, 5.0]), low, high)
+    assert not is_physical(6.0, high + [0.1, 0.0, 0.0], np.diag(moments), low, high)  # the centre lies outside
+    assert not is_physical(6.1, 0.5 * high, np.diag(moments), low, high)  # more than fits in
+    assert not is_physical(-6.0, 0.5 * high, np.diag(moments), low, high)
+    assert not is_physical(np.nan, 0.5 * high, np.diag(moments), low, high)
 
 
 def test_surfaces_that_close_are_told_from_others():
