@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from scenes import floor
+from scenes import SceneMaker, floor
 
+from sand_sim import World, read_scene
 from sand_sim.engine.chunks import CHUNK
 
 
@@ -181,6 +182,25 @@ def test_only_grains_that_move_are_allowed_to_go_far(make_world):
     moved = np.linalg.norm(world.observe().grains.velocity, axis=1) > 1e-6
     assert 2 <= moved.sum() < 50
     assert share[-2:].min() > 2.0 * np.median(share[~moved])
+
+
+@pytest.mark.parametrize("shape", ["sphere", "tetrahedron"])
+def test_lists_are_made_anew_before_anything_has_gone_farther_than_it_is_allowed(tmp_path, shape):
+    """But for the step in which it shows; so what is not on a list cannot have come within reach."""
+    maker, random = SceneMaker(tmp_path), np.random.default_rng(7)
+    position = 0.012 * np.stack(np.meshgrid(*3 * [range(3)], indexing="ij"), -1).reshape(-1, 3)
+    content = maker.scene(position, 0.003, velocity=random.normal(0.0, 0.3, position.shape), precision="single", time_step=1e-5)
+    content["fills"][0]["shape"] = shape
+    world = World(read_scene(content | {"domain": {"low": [-0.1] * 3, "high": [0.1] * 3}}, tmp_path))
+    arrays, quantum, most = world.assembly.solver.arrays, world.assembly.lattice.quantum, []
+    for _ in range(150):
+        world.step(10)
+        place, origin = (array.numpy().astype(float) for array in (arrays.grains.place, arrays.grains.origin))
+        speed = np.linalg.norm(arrays.grains.motion.numpy()[:, :3], axis=1)
+        far = np.linalg.norm(place[:, :3] - origin[:, :3], axis=1) - origin[:, 3] - 1.01 * speed * world.time_step / quantum
+        assert far.max() < 3.0
+        most.append(np.max(np.linalg.norm(place[:, :3] - origin[:, :3], axis=1) / origin[:, 3]))
+    assert max(most) > 0.9  # none of it for nothing
 
 
 def test_a_saved_world_goes_on_with_its_skin(make_world):
