@@ -1,0 +1,34 @@
+"""What a run comes down to: peaks of forces against a tool's motion, and what it carried and lost on the way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes import write_small_scene
+
+from sand_sim import World, load_scene
+from sand_sim.sinks.run_log import RunLog
+
+
+def test_draft_is_against_the_motion_lift_is_down_and_what_is_lost_is_spilled(tmp_path):
+    """The phase ``carry`` of the small scene lasts from 0.3 to 0.4 s."""
+    world = World(load_scene(write_small_scene(tmp_path)))
+    first = world.observe()
+    log = RunLog(world.scene)
+    rows = [  # time, velocity, force of the sand, mass
+        (0.1, [0.3, 0.4, 1.0], [-3.0, -4.0, 9.0], 0.5),  # 5 N against the motion, which is 3 to 4
+        (0.2, [-0.1, 0.0, 0.0], [-20.0, 7.0, -2.0], 0.7),  # pushed along; drawn down by 2 N
+        (0.3, [0.0, 0.0, 0.5], [50.0, 0.0, -4.0], 0.9),  # no draft where nothing moves sideways
+        (0.34, [0.1, 0.0, 0.0], [-1.0, 0.0, -6.0], 0.8),
+        (0.4, [0.1, 0.0, 0.0], [-1.0, 0.0, -5.0], 0.6),
+        (0.5, [0.1, 0.0, 0.0], [-1.0, 0.0, -1.0], 0.0),
+    ]
+    for number, (time, velocity, force, mass) in enumerate(rows):
+        report = replace(first.tools[0], velocity=np.array(velocity), world_force=np.array(force), carried=mass)
+        log.write(replace(first, time=time, steps=number, tools=(report,)))
+    told = log.summarise()["tools"]["plate"]
+    assert told["peak_draft_N"] == pytest.approx(5.0)
+    assert told["peak_lift_N"] == pytest.approx(6.0)
+    assert told["carried_kg"] == pytest.approx(0.6)
+    assert told["spilled_kg"] == pytest.approx(0.9 - 0.6)
+    assert told["carried_weight_N"] == pytest.approx((4.0 + 6.0 + 5.0) / 3.0)
