@@ -161,3 +161,25 @@ def test_chance_neither_sets_the_step_nor_what_may_be_added(tmp_path, size):
         world.add_grains([[0.0, 0.0, 0.07]], 0.002)
         steps.append(world.assembly.time_step.rayleigh)
     assert steps == pytest.approx([rayleigh_time(0.002, Material("grain", 2500.0, 1e7, 0.25))] * 3, rel=1e-12)
+
+
+def test_the_step_takes_no_sphere_of_a_body_for_heavier_than_what_yields_there(make_world):
+    """``1 / (1/m + (a x n) . I^-1 (a x n))`` for a push along n at the arm a, in the direction in which it yields most."""
+    material = {"density": 2500.0, "young": 1e7, "poisson": 0.25}
+    arms = np.array([[0.0, 0.02, 0.0], [0.01, 0.0, -0.005]])
+    plate = {"material": "wall", "spheres": np.column_stack([arms, [0.004, 0.003]]).tolist()}
+    inertia = np.array([1e-8, 4e-8, 4e-8])
+    plate |= {"mass": 1e-4, "inertia": inertia.tolist(), "pose": {"position": [0.1, 0.0, 0.0]}}
+    meet = [("grain", "grain"), ("grain", "wall"), ("wall", "wall")]
+    pairs = [{"between": list(names), "restitution": 0.5, "friction": 0.5} for names in meet]
+    world = make_world([[0.0] * 3], 0.005, material=material, wall=material, pairs=pairs, bodies={"plate": plate})
+    light = world.assembly.light
+    assert light.materials[light.material_index("grain")].density == 2500.0
+    middle = world.assembly.bodies[0].shape.middle
+    ways = np.random.default_rng(8).normal(size=(3000, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    least = []
+    for arm, radius in zip(arms - middle, (0.004, 0.003), strict=True):
+        yields = 1.0 / (1e4 + (np.cross(arm, ways) ** 2 / inertia).sum(axis=1))
+        least.append(yields.min() / (4.0 / 3.0 * np.pi * radius**3))
+    assert 0.5 * min(least) < light.materials[light.material_index("wall")].density <= 1.001 * min(least)
