@@ -37,7 +37,7 @@ def test_primitives_are_as_large_as_told_and_where_told():
         assert mesh.volume > 0.0
 
 
-@pytest.mark.parametrize("scale", ["0.001 0.002 0.003", "0.001 -0.002 0.003", "-0.001 -0.002 -0.003"])
+@pytest.mark.parametrize("scale", ["0.001 0.002 0.003", "0.001 -0.002 0.003", "-0.001 -0.002 0.003", "-0.001 -0.002 -0.003"])
 def test_meshes_are_scaled_and_mirrored(tmp_path, scale):
     """A wedge in millimetres: corners where the factors put them, and outside out although it may be mirrored."""
     wedge = trimesh.Trimesh(

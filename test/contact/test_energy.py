@@ -42,3 +42,29 @@ def test_springs_store_half_their_stiffness_times_displacement_squared(make_worl
     solver.arrays.wall_list.memory.assign(memory)
     displacement = np.array(held[:3])
     assert solver.measure().elastic - normal == pytest.approx(0.5 * stiffness * displacement @ displacement, rel=1e-6)
+
+
+@pytest.mark.parametrize("integrator", ["velocity_verlet", "symplectic_euler"])
+def test_kinetic_and_elastic_energy_are_of_one_moment(make_world, integrator):
+    """An elastic impact at 1/50 of its duration: with energies half a step apart their sum would be off by 6 % on the way."""
+    radius, speed, density, young = 0.005, 0.2, 2500.0, 1e7
+    mass, stiff = density * 4.0 / 3.0 * np.pi * radius**3, 0.5 * young / (1.0 - 0.25**2)
+    duration = 2.868 * ((0.5 * mass) ** 2 / (0.5 * radius * stiff**2 * speed)) ** 0.2
+    world = make_world(
+        [[0.0, 0.0, 0.0], [2.0 * radius + 1e-6, 0.0, 0.0]],
+        radius,
+        velocity=[[0.5 * speed, 0.0, 0.0], [-0.5 * speed, 0.0, 0.0]],
+        restitution=1.0,
+        friction=0.0,
+        contact={"tangential": "none"},
+        time_step=duration / 50,
+        integrator=integrator,
+    )
+    start, stored = mass * (0.5 * speed) ** 2, []
+    for _ in range(60):
+        world.step()
+        health = world.observe().health
+        stored.append(health.elastic)
+        assert health.kinetic + health.elastic == pytest.approx(start, rel=5e-3)
+    assert max(stored) > 0.95 * start
+    assert stored[-1] == 0.0
