@@ -92,6 +92,9 @@ def test_grains_come_and_go(client, start_node):
     client.connect()
     good, told = ask(client, "spawn_grains", position=[0.1, 0.1, 0.05, 0.1, 0.12, 0.05], radius=0.005, velocity=[0.0, 0.0, -0.1])
     assert (good, told) == (True, "2 grains, id 32 to 33")
+    new = node.simulation.request(node.simulation.world.observe).result(30.0).grains
+    assert new.position[32:] == pytest.approx(np.array([[0.1, 0.1, 0.05], [0.1, 0.12, 0.05]]), abs=1e-6)
+    assert new.velocity[32:] == pytest.approx(np.array([[0.0, 0.0, -0.1]] * 2), abs=1e-6)
     client.wait_for(lambda: client.clouds and len(cloud_to_points(client.clouds[-1])) == 34)
     assert client.call(Trigger, "step").success
     good, told = ask(client, "remove_grains", low=[0.05, 0.05, 0.0], high=[0.2, 0.2, 0.2])

@@ -200,6 +200,7 @@ def test_inputs_that_cannot_be_are_named(ros, start_node, parameters, named):
 def test_velocities_drive_a_tool(client, start_node):
     parameters = {
         "tools.plate.source": "twist",
+        "tools.plate.frame": "tcp",
         "frame_names": ["base"],
         "frames.base.pose": [0.0, 0.0, 0.0, 0.0, 0.0, 0.5 * np.pi],
     }
@@ -217,7 +218,9 @@ def test_velocities_drive_a_tool(client, start_node):
     report = drive(0.2, "plate", forward)
     assert report.position == pytest.approx(START + [0.01, 0.01, 0.0], abs=3e-5), "it has turned left"
     assert drive(0.3, "base", forward).position == pytest.approx(START + [0.01, 0.02, 0.0], abs=5e-5)
-    twists.publish(command_to_twist(ToolVelocity("plate", forward, np.zeros(3), time=0.4), "moon"))
+    assert drive(0.4, "tcp", forward).position == pytest.approx(START + [0.01, 0.03, 0.0], abs=7e-5), "the same as 'plate'"
+    assert drive(0.5, "base", np.zeros(3), (0.5, 0.0, 0.0)).spin == pytest.approx([0.0, 0.5, 0.0], abs=1e-6)
+    twists.publish(command_to_twist(ToolVelocity("plate", forward, np.zeros(3), time=0.6), "moon"))
     client.wait_for(lambda: node.simulation.rejected == {"unknown_frame": 1})
 
 
@@ -251,8 +254,9 @@ def follow(monkeypatch):
     return start
 
 
-def test_a_tool_follows_its_frame_in_tf(follow):
-    tell, submitted, rejected = follow()
+@pytest.mark.parametrize("last", [None, SimpleNamespace(time=1.0)])
+def test_a_tool_follows_its_frame_in_tf(follow, last):
+    tell, submitted, rejected = follow(lambda: last)
     tell("/tf", Frame("tcp", "arm", np.array([0.0, 0.0, 0.1]), NO_TURN, 0.5))
     assert not submitted, "not connected to the world yet"
     tell("/tf_static", Frame("base", "world", np.array([1.0, 0.0, 0.0]), NO_TURN))
@@ -266,6 +270,14 @@ def test_a_tool_follows_its_frame_in_tf(follow):
     tell("/tf", Frame("arm", "base", np.array([0.0, np.nan, 1.0]), TURNED, 0.9))
     assert [error.reason for error in rejected] == ["not_finite"]
     assert len(submitted) == 1
+
+
+def test_what_does_not_concern_a_frame_that_never_moves_sends_no_tool(follow):
+    tell, submitted, _ = follow()
+    tell("/tf_static", Frame("tcp", "world", np.array([1.0, 0.0, 0.0]), NO_TURN))
+    for k in range(3):
+        tell("/tf", Frame("wheel", "world", np.zeros(3), NO_TURN, 0.1 * k))
+    assert [command.time for command in submitted] == [None]
 
 
 def test_frames_stamped_ahead_do_not_stand_for_what_the_arm_tells(follow):
