@@ -144,6 +144,26 @@ def test_heights_and_their_grid(client, start_node):
     assert np.isfinite(heights).sum() >= 9
 
 
+@pytest.mark.parametrize("edge", [0.0, 0.0101])
+def test_a_cloud_shows_the_box_that_is_asked_for_and_the_topmost_of_each_voxel(client, start_node, edge):
+    box = [-0.2, 0.005, -0.01, 0.012, 0.025, 0.3]  # two places along x, two along y, all heights
+    node = start_node(pacing="lockstep", points_region=box, points_voxel=edge, points_fields=["id", "mass", "position"])
+    client.wait_for(lambda: client.clouds)
+    points = cloud_to_points(client.clouds[-1])
+    seen = node.simulation.request(node.simulation.world.observe).result(30.0).grains
+    inside = np.all((seen.position > box[:3]) & (seen.position < box[3:]), axis=1)
+    assert 4 <= inside.sum() < len(seen) / 2
+    if edge:
+        voxel = np.floor(seen.position / edge).astype(int)
+        inside &= [
+            not np.any(np.all(voxel == one, axis=1) & inside & (seen.position[:, 2] > z))
+            for one, z in zip(voxel, seen.position[:, 2], strict=True)
+        ]
+    assert points["id"].tolist() == seen.identity[inside].tolist()
+    assert points["mass"] == pytest.approx(seen.mass[inside])
+    assert points["z"] == pytest.approx(seen.position[inside, 2])
+
+
 def test_a_height_map_that_nobody_has_asked_for_is_no_larger_than_it_may_be(client, start_node, monkeypatch):
     monkeypatch.setattr(bed_outputs, "_MOST_CELLS", 8)
     start_node(pacing="lockstep")
