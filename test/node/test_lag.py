@@ -48,6 +48,11 @@ def test_poses_by_the_wall_clock_while_real_time_is_not_kept(monkeypatch):
     assert watched.pass_seconds(15, kept=0.95, unstamped=50)[-1] == ""
 
 
+@pytest.mark.parametrize(("kept", "told"), [(0.82, False), (0.78, True)])
+def test_eight_tenths_count_as_kept_as_documented(monkeypatch, kept, told):
+    assert any(Watched(monkeypatch).pass_seconds(30, kept, unstamped=50)) == told
+
+
 def test_what_is_asked_counts(monkeypatch):
     watched = Watched(monkeypatch, real_time_factor=0.1)
     assert not any(watched.pass_seconds(30, kept=0.09, unstamped=50))

@@ -124,6 +124,7 @@ def test_bad_poses_are_rejected_counted_and_the_node_goes_on(client, start_node)
     client.wait_for(lambda: client.time > 0.019)
     assert node.simulation.rejected == {"unknown_frame": 2, "not_finite": 1, "zero_quaternion": 1, "no_stamp": 1}
     client.wait_for(lambda: client.diagnosed("commands rejected") == "5")
+    assert stamp_to_time(client.diagnostics[-1].header.stamp) == pytest.approx(client.time)
     assert client.diagnosed("commands rejected: unknown_frame") == "2"
     assert "header.frame_id" in client.diagnosed("last rejection") or "stamp" in client.diagnosed("last rejection")
 

@@ -17,6 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 from msg_adapters import tf2_msgs
@@ -127,6 +128,14 @@ def test_wrenches_of_a_turned_tool_are_in_the_axes_that_are_asked_for(client, st
         meant = expected[kind] if axes == "world" else rotation.rotate(rotation.inverse(turns[-1]), expected[kind])
         assert message.header.frame_id == ("world" if axes == "world" else "plate")
         assert np.array(wrench_to_arrays(message)) == pytest.approx(meant, rel=1e-6, abs=1e-9)
+    frame = node._tools[0].frame(node.recorder.log.last)  # as TF tells it
+    assert (frame.name, frame.parent, frame.time) == ("plate", "world", pytest.approx(0.6, abs=1e-5))
+    assert frame.position == pytest.approx(PRESSED)
+    assert frame.orientation == pytest.approx(turns[-1])
+    assert client.call(Trigger, "reset").success
+    client.wait_for(lambda: all(stamp_to_time(heard[-1].header.stamp) == 0.0 for heard in (client.wrenches, filtered)))
+    anew = [np.array(wrench_to_arrays(heard[-1])) for heard in (client.wrenches, filtered)]
+    assert anew[1] == pytest.approx(anew[0], abs=1e-9), "nothing is left of what was before the reset"
 
 
 def test_heights_and_their_grid(client, start_node):

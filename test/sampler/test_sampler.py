@@ -124,6 +124,11 @@ def test_mass_properties_of_a_box():
     assert body.centre == pytest.approx([0.1, 0.2, 0.3])
     expected = volume / 12.0 * np.diag([0.1**2 + 0.06**2, 0.2**2 + 0.06**2, 0.2**2 + 0.1**2])
     assert body.inertia == pytest.approx(expected, rel=1e-9, abs=1e-15)
+    for given, density in (({"density": 2700.0}, 2700.0), ({"mass": 0.6}, 0.6 / volume)):
+        properties = body.mass_properties(**given)
+        assert properties.mass == pytest.approx(density * volume)
+        assert properties.inertia == pytest.approx(density * expected, rel=1e-9, abs=1e-12)
+        assert properties.principal == pytest.approx(np.sort(np.diag(density * expected)))
 
 
 def test_an_open_shell_is_a_sheet_and_weighs_what_its_thickness_says(sphere):
