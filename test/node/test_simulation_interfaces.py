@@ -301,7 +301,8 @@ def test_entities(run, package):
 
 def test_a_tool_is_sent_to_a_pose(run, client, package):
     results, codes = package.msg.Result, package.srv.SetEntityState.Response
-    node = run(pacing="fast", paused=True)
+    base = {"frame_names": "[base]", "frames.base.pose": "[0.1, 0.0, 0.0, 0.0, 0.0, 1.5707963267948966]"}  # turned left
+    node = run(pacing="fast", paused=True, **base)
 
     def sent(entity="plate", frame="", set_pose=True, set_twist=False, turn=1.0, **position):
         state = package.msg.EntityState()
@@ -316,6 +317,11 @@ def test_a_tool_is_sent_to_a_pose(run, client, package):
     node.ask("StepSimulation", steps=10)  # 0.2 s, the usual stream_gap
     place = node.ask("GetEntityState", entity="plate").state.pose.position
     np.testing.assert_allclose([place.x, place.y, place.z], list(target.values()), atol=1e-6)
+    assert sent(frame="base", x=0.01, y=0.08, z=0.1) == results.RESULT_OK
+    node.ask("StepSimulation", steps=40)
+    pose = node.ask("GetEntityState", entity="plate").state.pose
+    np.testing.assert_allclose([pose.position.x, pose.position.y, pose.position.z], [0.02, 0.01, 0.1], atol=1e-6)
+    np.testing.assert_allclose([abs(pose.orientation.z), abs(pose.orientation.w)], [0.5**0.5] * 2, atol=1e-6)
 
     assert sent(x=float("nan")) == codes.INVALID_POSE
     assert sent(x=0.1, turn=0.0) == codes.INVALID_POSE

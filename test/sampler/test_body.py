@@ -284,6 +284,8 @@ def test_mass_needs_one_positive_number(given):
 def test_thinnest_wall():
     tray = trimesh.creation.box((0.1, 0.1, 0.0031))
     assert sample_body(tray, radius=0.005).thinnest_wall == pytest.approx(0.0031, rel=1e-3)
+    spike = trimesh.Trimesh([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    assert sample_body(spike, radius=0.005).thinnest_wall == np.inf  # none of its faces looks away from another
 
 
 def test_the_field_follows_the_distance():
