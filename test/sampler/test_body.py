@@ -187,6 +187,15 @@ def test_a_leaky_body_is_refused():
         sample_body(wavy_ball(), radius=0.001, count=300, grain=0.001)
 
 
+def test_the_smallest_grain_that_is_told_is_the_least_that_is_stopped():
+    mesh = trimesh.creation.box((0.1, 0.06, 0.02))
+    body = sample_body(mesh, 0.004, count=300)
+    assert body.smallest_grain == pytest.approx(body.coverage - 0.004)
+    sample_body(mesh, 0.004, count=300, grain=1.01 * body.smallest_grain)
+    with pytest.raises(MeshError, match="could pass"):
+        sample_body(mesh, 0.004, count=300, grain=0.99 * body.smallest_grain)
+
+
 @pytest.mark.parametrize("grain", [0.001, 0.004, 0.02])
 def test_contact_normals_lean_as_much_as_is_told(grain):
     box = trimesh.creation.box((0.1, 0.1, 0.02))
