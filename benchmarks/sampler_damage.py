@@ -14,13 +14,13 @@ import numpy as np
 import trimesh
 
 from benchmarks.provenance import provenance
-from sampler import MeshError, SignedDistance, read_mesh, repair_mesh
-from sampler.mass import integrate
+from sampler import MeshError, ParticleBody, SignedDistance, read_mesh, sample_body
 from sampler.quiet import start_warp
 
 ENDINGS = ".stl", ".obj", ".ply", ".dae"
 NODES, NEAR, SCATTER = 22, 3000, 5e-3  # of the grid along an axis, places near the surface, and how near, of the diagonal
 UNSURE = 1.1e-5  # of the diagonal: nearer to the surface a sign means nothing
+RADIUS, PARTICLES = 1e-3, 200  # of the body that tells the mass, of the diagonal
 MEASURES = "grid", "near", "volume", "centre", "inertia"  # shares of wrong signs, and how far off, the centre of the diagonal
 HARMLESS = 1e-4, 1e-3, 1e-3, 1e-3, 1e-3
 MEANT = {  # at most
@@ -91,16 +91,20 @@ class Sound:
         distance = SignedDistance(mesh)
         self.places = [x[far_from_surface(distance, x, UNSURE)] for x in (grid_around(mesh, NODES), near)]
         self.inside = [solid_angle_inside(np.asarray(mesh.triangles), x) for x in self.places]
-        self.volume, self.centre, self.inertia = integrate(np.asarray(mesh.triangles))
+        self.body = self.body_of(mesh)
 
     def judge(self, mesh: trimesh.Trimesh) -> list[float]:
-        """How far off a damaged copy is, by ``MEASURES``."""
-        repaired = repair_mesh(mesh)
-        distance = SignedDistance(repaired)
+        """How far off a damaged copy is, by ``MEASURES``; the body of particles made of it tells the mass."""
+        distance = SignedDistance(mesh)
         signs = [np.mean((distance.query(x)[0] < 0.0) != true) for x, true in zip(self.places, self.inside, strict=True)]
-        volume, centre, inertia = integrate(distance.surface.triangles)
-        masses = abs(volume / self.volume - 1.0), np.linalg.norm(centre - self.centre) / self.diagonal
-        return [float(x) for x in (*signs, *masses, np.abs(inertia - self.inertia).max() / np.abs(self.inertia).max())]
+        body = self.body_of(mesh)
+        masses = abs(body.volume / self.body.volume - 1.0), np.linalg.norm(body.centre - self.body.centre) / self.diagonal
+        inertia = np.abs(body.inertia - self.body.inertia).max() / np.abs(self.body.inertia).max()
+        return [float(x) for x in (*signs, *masses, inertia)]
+
+    def body_of(self, mesh: trimesh.Trimesh) -> ParticleBody:
+        """A body of few particles."""
+        return sample_body(mesh, radius=RADIUS * self.diagonal, count=PARTICLES)
 
 
 def mesh_files(paths: list[Path], seed: int = 0) -> list[Path]:
