@@ -85,7 +85,7 @@ class Sound:
     """A sound mesh, places around it, and what is true there."""
 
     def __init__(self, mesh: trimesh.Trimesh):
-        self.mesh, self.diagonal = mesh, float(np.linalg.norm(mesh.extents))
+        self.diagonal = float(np.linalg.norm(mesh.extents))
         near, _ = trimesh.sample.sample_surface(mesh, NEAR, seed=1)
         near = near + np.random.default_rng(1).normal(size=near.shape) * SCATTER * self.diagonal
         distance = SignedDistance(mesh)
@@ -148,13 +148,16 @@ def main(arguments: list[str] | None = None) -> None:
                 beyond = [f"{name} {x:.2%}" for name, x, most in zip(MEASURES, off, meant, strict=True) if not x <= most]
                 if beyond:
                     print(f"{path}, {how}, place {seed}: {', '.join(beyond)}", file=sys.stderr, flush=True)
+    source = provenance()
     for how, rows in found.items():
+        if not rows:
+            parser.error(f"none of these is a sound mesh of {options.faces[0]} to {options.faces[1]} triangles")
         off = np.array(rows)
         counts = dict(zip(MEASURES, np.count_nonzero(~(off <= MEANT[how]), axis=0).tolist(), strict=True))
         worst = dict(zip(MEASURES, off.max(axis=0).tolist(), strict=True))
         median = dict(zip(MEASURES, np.median(off, axis=0).tolist(), strict=True))
         line = {"benchmark": "sampler_damage", "case": how, "damaged": len(rows), "beyond": counts, "median": median}
-        print(json.dumps(line | {"worst": worst} | provenance()), flush=True)
+        print(json.dumps(line | {"worst": worst} | source), flush=True)
 
 
 if __name__ == "__main__":

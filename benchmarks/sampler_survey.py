@@ -88,11 +88,12 @@ def main(arguments: list[str] | None = None) -> None:
         print(table([json.loads(line) for path in options.paths for line in path.read_text().splitlines()]))
         return
     start_warp()
+    source = provenance()
     part, parts = map(int, options.part.split("/"))
     sample_body(trimesh.creation.icosphere(), radius=0.1, count=100)
     for path in mesh_files(options.paths)[: options.most][part - 1 :: parts]:
         row = survey(path, options.count)
-        print(json.dumps(row | provenance()), flush=True)
+        print(json.dumps(row | source), flush=True)
         if row.get("beyond"):
             print(f"{path}: {', '.join(row['beyond'])}", file=sys.stderr, flush=True)
 

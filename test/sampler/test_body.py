@@ -188,8 +188,7 @@ def test_a_leaky_body_is_refused():
 
 
 def test_the_smallest_grain_that_is_told_is_the_least_that_is_stopped():
-    mesh = trimesh.creation.box((0.1, 0.06, 0.02))
-    body = sample_body(mesh, 0.004, count=300)
+    body = sample_body(mesh := trimesh.creation.box((0.1, 0.06, 0.02)), 0.004, count=300)
     assert body.smallest_grain == pytest.approx(body.coverage - 0.004)
     sample_body(mesh, 0.004, count=300, grain=1.01 * body.smallest_grain)
     with pytest.raises(MeshError, match="could pass"):
