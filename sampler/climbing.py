@@ -1,37 +1,86 @@
 """From places that are far from all particles to the farthest ones near by."""
 
-from collections.abc import Callable
-
 import numpy as np
+import warp as wp
 
+from sampler.cells import Cells
+from sampler.closest import closest_point
+from sampler.gap_kernels import MODULE, nearest_particles
+from sampler.launching import launch_shares
+from sampler.skin import Skin
+from sampler.surface import ASIDE, nearest_face
 from sampler.topology import merge_points
 
 _STARTS = 150  # places to climb from
 _CELL = 0.5  # of those with the same particle nearest one in each cell of so many spacings, so that they lie in many gaps
 _KNOWN = 20  # the worst places among which they are chosen, per start
-_FIRST, _SHORTER = 0.12, 0.7  # length of the first step, in spacings, and of each following one, of that before
-_TRIALS = 4  # places tried in each step
+_FIRST, _SHORTER = wp.constant(0.12), wp.constant(0.7)  # length of the first step, in spacings, and of each next, of that before
+_TRIALS = wp.constant(4)  # places tried in each step
+_BACK = wp.constant(1.0e-4)  # of the diagonal: how much farther than they went places are sought back
+
+
+@wp.kernel(enable_backward=False, module=MODULE)
+def climb_from(
+    cells: Cells,
+    mesh: wp.uint64,
+    corners: wp.array(dtype=wp.vec3),
+    face_normals: wp.array(dtype=wp.vec3),
+    spacing: float,
+    most: float,
+    along: int,
+    steps: int,
+    seed: int,
+    first: int,
+    places: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    ways: wp.array(dtype=float),
+):
+    """Take each place to the worst one near by, step by step; each step is the best of some at random that are better."""
+    i = first + wp.tid()
+    random = wp.rand_init(seed, i)
+    length = _FIRST * spacing
+    for _ in range(steps):
+        here = places[i]
+        up = normals[i]
+        for _ in range(_TRIALS):
+            aside = length * wp.vec3(wp.randn(random), wp.randn(random), wp.randn(random))
+            face = nearest_face(mesh, here + aside, 1.01 * wp.length(aside) + _BACK, up, ASIDE)
+            if face >= 0:
+                there = closest_point(corners[3 * face], corners[3 * face + 1], corners[3 * face + 2], here + aside)
+                closest, own = nearest_particles(cells, there, face_normals[face], spacing, most)
+                way = wp.where(along == 1, own.way, closest.way)
+                if way > ways[i]:
+                    places[i] = there
+                    normals[i] = face_normals[face]
+                    ways[i] = way
+        length *= _SHORTER
 
 
 def climb(
+    skin: Skin,
+    cells: Cells,
     points: np.ndarray,
     normals: np.ndarray,
     found: np.ndarray,
-    beside: Callable[[np.ndarray, np.ndarray, tuple[float, ...]], tuple[np.ndarray, np.ndarray]],
-    ways: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    along: bool,
     steps: int,
     spacing: float,
+    most: float,
+    random: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Climb from the worst places to the worst ones near by: random places miss these by some percent.
 
     Args:
+        skin: where they lie.
+        cells: the particles, with lists.
         points: places to begin with, shape (n, 3) [m].
         normals: of the surface there, shape (n, 3).
         found: the particles nearest to them, shape (n,) of ``Nearest``.
-        beside: places a little aside of others, as ``Gaps.beside``.
-        ways: distances of places from the nearest particle, shape (n,), in spacings.
+        along: whether ways along the surface are meant.
         steps: how many, each shorter than that before.
         spacing: of the particles [m].
+        most: how far particles are looked for, in spacings.
+        random: where chance comes from.
 
     Returns:
         The worst places, shape (m, 3) [m], the normals there, shape (m, 3), and their distances, shape (m,), in spacings.
@@ -43,12 +92,8 @@ def climb(
     cell = merge_points(np.floor(points[order] / (_CELL * spacing)))
     first = np.unique(which[order].astype(np.int64) * known + cell, return_index=True)[1]
     chosen = order[np.sort(first)[:_STARTS]]
-    points, normals, way = points[chosen], normals[chosen], way[chosen]
-    for step in _FIRST * _SHORTER ** np.arange(steps):
-        places = beside(points, normals, (step,) * _TRIALS)
-        trial = ways(*places).reshape(_TRIALS, -1)
-        best, each = trial.argmax(axis=0), np.arange(len(points))
-        better = np.flatnonzero(trial[best, each] > way)
-        k = best[better] * len(points) + better
-        points[better], normals[better], way[better] = places[0][k], places[1][k], trial[best, each][better]
-    return points, normals, way
+    places, up = skin.shift(points[chosen]), skin.vectors(normals[chosen])
+    ways = wp.array(way[chosen].astype(np.float32), dtype=float, device=skin.device)
+    options = [spacing / skin.unit, most, int(along), steps, int(random.integers(2**31))]
+    launch_shares(climb_from, len(chosen), [cells, *skin.faces, *options], [places, up, ways], skin.device)
+    return skin.back(places), up.numpy().astype(float), ways.numpy()

@@ -1,13 +1,13 @@
 """How particles cover a surface: where gaps are, which particles are too near to others, and which would be missed the least."""
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 import warp as wp
 
+from sampler.cells import add_lists, sort_into_cells
 from sampler.climbing import climb
-from sampler.gap_kernels import Nearest, find_gaps, find_nearest
+from sampler.gap_kernels import Nearest, find_gaps, find_neighbours
 from sampler.launching import launch_shares
 from sampler.skin import Skin
 
@@ -20,7 +20,7 @@ _ROOM, _NEAR = 0.55, 0.4  # a gap is filled so far from particles of other skins
 _LEAST, _TOO_NEAR = 0.40, 0.37  # particles nearer than this to one another are a fault, and a grave one, in spacings
 _LONELY, _BESIDE = 1.09, (0.6, 1.06)  # those farther than this from all others get a neighbour, how far beside them; in spacings
 _MOVED, _TURNED = 1e-3, 0.999  # what has moved less, in spacings, and turned less, by the cosine, lies where it was
-_CELL = 2.0  # of the grid that particles are found with, in spacings: most are looked for within one, in 8 cells and not in 27
+_CELL = 0.6  # width of the cells of the grid that particles are found with, in spacings
 FAR = 2.0  # how far particles are looked for, in spacings; farther ones are as bad
 
 
@@ -86,7 +86,7 @@ class Gaps:
 
     def __init__(self, skin: Skin, spacing: float):
         self.skin, self.spacing, self.device = skin, spacing, skin.device
-        self.grid = wp.HashGrid(64, 64, 64, device=self.device)
+        self._unit_spacing = spacing / skin.unit
         self.points = self.normals = np.empty((0, 3))
         self.places = Places(self.points, self.normals, *np.empty((2, 0), Nearest.numpy_dtype()), np.empty(0, bool))
 
@@ -101,15 +101,16 @@ class Gaps:
             np.where(moved[:, None], new, np.concatenate([old, new[len(old) :]]))
             for new, old in ((points, self.points), (normals, self.normals))
         )
-        self._where, self._up = self.skin.shift(self.points), self._vectors(self.normals)
-        self.grid.build(self._where, _CELL * self.spacing / self.skin.unit)
+        where = self.skin.shifted(self.points)
+        self.cells = sort_into_cells(where, self.normals, _CELL * self._unit_spacing, self.device)
+        add_lists(self.cells, self._unit_spacing, self.device)
         places = self.places
         stale = _near_cells(places.points, changed, self.spacing) | (places.own["way"] > 1.0)  # farther ones may be anywhere
         places.closest[stale], places.own[stale] = self.measure(places.points[stale], places.normals[stale])
 
     def add(self, points: np.ndarray, normals: np.ndarray, fixed: bool = False) -> None:
         """Look at more places, shape (n, 3) [m], with the normals there; for good if they are fixed, else those in doubt."""
-        found = self.measure(points, normals, 1.0 if fixed else _GAP[0] - _WATCHED)
+        found = self.measure(points, normals)
         new = Places(points, normals, *found, np.full(len(points), fixed))
         self.places = self.places.joined(new if fixed else new.at(new.excess > -_WATCHED))
 
@@ -132,32 +133,29 @@ class Gaps:
         self.places = places.at(places.fixed | (excess > -_WATCHED))
         return verdict
 
-    def widen(self, most: float) -> None:
-        """Sort the particles so that they are found fast as far as ``most``, in spacings."""
-        self.grid.build(self._where, max(_CELL, most / FAR) * self.spacing / self.skin.unit)
-
     def neighbour_distances(self, most: float = FAR) -> np.ndarray:
         """Distance of particles from the nearest other one, at most ``most``; in spacings."""
-        unit = self.spacing / self.skin.unit
         nearest = wp.empty(len(self.points), dtype=float, device=self.device)
-        launch_shares(find_nearest, len(self.points), [self.grid.id, self._where, most * unit], [nearest], self.device)
-        return nearest.numpy() / unit
+        launch_shares(find_neighbours, len(self.points), [self.cells, self._unit_spacing, most], [nearest], self.device)
+        return nearest.numpy()
 
-    def measure(
-        self, points: np.ndarray, normals: np.ndarray, enough: float = 1.0, most: float = FAR
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def measure(self, points: np.ndarray, normals: np.ndarray, most: float = FAR) -> tuple[np.ndarray, np.ndarray]:
         """Particles nearest to places, and along the surface, as ``find_gaps``."""
         found = tuple(wp.empty(len(points), dtype=Nearest, device=self.device) for _ in range(2))
-        inputs = [self.grid.id, self._where, self._up, self.skin.shift(points), self._vectors(normals)]
-        launch_shares(find_gaps, len(points), [*inputs, self.spacing / self.skin.unit, enough, most], list(found), self.device)
+        inputs = [self.cells, self.skin.shift(points), self.skin.vectors(normals), self._unit_spacing, most]
+        launch_shares(find_gaps, len(points), inputs, list(found), self.device)
         return tuple(values.numpy() for values in found)
+
+    def climb(
+        self, places: "Places", along: bool, steps: int, random: np.random.Generator, most: float = FAR
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Worst places near the worst of these, the normals there, and how far they are, as ``climb``."""
+        found = places.own if along else places.closest
+        return climb(self.skin, self.cells, places.points, places.normals, found, along, steps, self.spacing, most, random)
 
     def _seek(self, random: np.random.Generator) -> None:
         """Look at the worst places near the worst ones known, too."""
-        places, beside, worst = self.places, partial(self.beside, random=random), []
-        for along, found in enumerate((places.closest, places.own)):
-            known = places.points, places.normals, found
-            worst.append(climb(*known, beside, lambda *at, k=along: self.measure(*at)[k]["way"], _STEPS, self.spacing)[:2])
+        worst = [self.climb(self.places, along, _STEPS, random)[:2] for along in (False, True)]
         self.add(*map(np.concatenate, zip(*worst, strict=True)))
 
     def _places_beside(self, which: np.ndarray):
@@ -208,19 +206,6 @@ class Gaps:
             if len(near):
                 chosen[n] = near[room[near].argmax()]
         return chosen
-
-    def beside(
-        self, points: np.ndarray, normals: np.ndarray, steps: tuple[float, ...], random: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Places a little aside of others, one for each step, in spacings, and the normals there; all of the first step first."""
-        aside = np.repeat(steps, len(points))[:, None] * self.spacing * random.standard_normal((len(steps) * len(points), 3))
-        points, normals = (np.tile(x, (len(steps), 1)) for x in (points, normals))
-        reach = 1.01 * np.linalg.norm(aside, axis=1) + 1e-4 * self.skin.unit  # the way back, if none is shorter
-        points, face = self.skin.closest(points + aside, reach, up=normals)
-        return points, self.skin.normals[face]
-
-    def _vectors(self, values: np.ndarray) -> wp.array:
-        return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
 
 
 def _excess(free: np.ndarray, own: np.ndarray, gap: tuple[float, float] = _GAP) -> np.ndarray:

@@ -1,15 +1,17 @@
 """Spread particles evenly over a surface: throw them apart, let them push each other along it, then find gaps and fill them."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 import warp as wp
 
+from sampler.cells import empty_cells, sort_into_cells
 from sampler.gaps import Gaps, Verdict
 from sampler.lattice import lattice_spacing
 from sampler.launching import launch_shares
 from sampler.skin import Skin
-from sampler.spreading_kernels import BEYOND, FREE, HELD, push_apart, throw_darts
+from sampler.spreading_kernels import push_apart, throw_darts
 
 _SCATTERED = 12  # random places per wanted particle
 _HALVINGS = 7  # of the range in which the distance of the first placing is sought
@@ -19,6 +21,7 @@ _SAMPLED = 40  # places per particle at which gaps are looked for, over the area
 _CONFIRMED, _LOOKS = 60, 3  # and at fresh ones where hardly any is left, until none is found there, so often at most
 _HARDLY, _FINE = 1.0, 0.03  # sum of faults in spacings at which that is so, and at which all is well
 _STRENGTH = 0.25  # of a push, in spacings
+_CELL = 2.0  # width of the cells of the grid that particles are found with, in spacings
 _AROUND = 3.0  # distance from a filled gap or a removed particle within which others move, in spacings
 _SPARE, _MORE = 0.005, 0.009  # share of the particles kept back for gaps, and share that may be added above the wanted number
 _PATIENCE = 6  # refills without improvement after which the best is taken
@@ -94,26 +97,19 @@ class _State:
         self.skin, self.device, self.observe, self.beyond = skin, skin.device, observe, beyond
         self.spacing = lattice_spacing(float(skin.areas.sum()), number)
         self.unit_spacing = self.spacing / skin.unit
-        self.grid = wp.HashGrid(64, 64, 64, device=self.device)
-        self.corners = skin.shift(skin.triangles.reshape(-1, 3))
-        self.face_normals = self.vectors(skin.normals)
         self.most = number + int(_MORE * number)
-
-    def vectors(self, values: np.ndarray) -> wp.array:
-        return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
 
     def place(self, points: np.ndarray, normals: np.ndarray, held: np.ndarray) -> None:
         self.number, more = len(points), len(self.beyond)
         self.points = self.skin.shift(np.concatenate([points, self.beyond]))
-        self.normals = self.vectors(np.concatenate([normals, np.zeros((more, 3))]))
-        held = np.concatenate([np.where(held, HELD, FREE), np.full(more, BEYOND)])
-        self.held = wp.array(held, dtype=int, device=self.device)
+        self.normals = self.skin.vectors(np.concatenate([normals, np.zeros((more, 3))]))
+        self.held = wp.array(np.concatenate([held, np.ones(more, bool)]), dtype=int, device=self.device)
         self.moved, self.moved_normals = wp.empty_like(self.points), wp.empty_like(self.normals)
 
     def push(self, strength: float) -> None:
         h = self.unit_spacing
-        self.grid.build(self.points, 2.0 * h)
-        inputs = [self.grid.id, self.skin.mesh.id, self.points, self.normals, self.corners, self.face_normals, self.held]
+        cells = sort_into_cells(self.points.numpy(), self.normals.numpy(), _CELL * h, self.device)
+        inputs = [cells, *self.skin.faces, self.held]
         outputs = [self.moved, self.moved_normals]
         launch_shares(push_apart, len(self.points), [*inputs, h, self.apart, strength * h], outputs, self.device)
         self.points, self.moved = self.moved, self.points
@@ -122,7 +118,7 @@ class _State:
             self.observe(self.positions())
 
     def positions(self) -> np.ndarray:
-        return self.points.numpy()[: self.number] * self.skin.unit + self.skin.centre
+        return self.skin.back(self.points)[: self.number]
 
     def result(self) -> tuple[np.ndarray, np.ndarray]:
         points, face = self.skin.closest(self.positions(), 0.1 * self.spacing, up=self.normals.numpy()[: self.number])
@@ -160,16 +156,17 @@ def _throw(skin: Skin, number: int, spacing: float, random: np.random.Generator)
     points, normals = skin.sample(_SCATTERED * number, random)
     order = random.permutation(len(points))
     points, normals = points[order], normals[order]
-    where = skin.shift(points).to("cpu")  # one after another, so on the CPU wherever the rest runs
-    up = wp.array(normals.astype(np.float32), dtype=wp.vec3, device="cpu")
-    grid = wp.HashGrid(128, 128, 128, device="cpu")
+    where = skin.shifted(points)
+    cells = empty_cells(where, spacing / skin.unit)
+    places, up = (wp.array(x.astype(np.float32), dtype=wp.vec3, device="cpu") for x in (where, normals))  # one after another
+    last, before, kept = (wp.empty(n, dtype=int, device="cpu") for n in (math.prod(cells.size), len(points), len(points)))
     low, high, best = 0.2, 1.0, np.ones(len(points), bool)
     for _ in range(_HALVINGS):
         share = 0.5 * (low + high)
-        apart = share * spacing / skin.unit
-        grid.build(where, apart)
-        kept = wp.zeros(len(points), dtype=int, device="cpu")
-        wp.launch(throw_darts, dim=1, inputs=[grid.id, where, up, apart, len(points), kept], device="cpu")
+        last.fill_(-1)
+        kept.zero_()
+        inputs = [cells, places, up, share * spacing / skin.unit, number, last, before, kept]
+        wp.launch(throw_darts, dim=1, inputs=inputs, device="cpu")
         enough = kept.numpy().sum() >= number
         low, high = (share, high) if enough else (low, share)
         best = kept.numpy() == 1 if enough else best

@@ -5,6 +5,7 @@ from functools import cached_property
 import numpy as np
 import warp as wp
 
+from sampler.closest import closest_on_triangles
 from sampler.launching import launch_shares
 from sampler.rays import closing_cones, count_windings, leavings_between
 
@@ -183,8 +184,24 @@ class Surface:
 
     def shift(self, points: np.ndarray) -> wp.array:
         """Points in the frame and unit of the queries."""
-        moved = ((np.asarray(points, float) - self.centre) / self.unit).astype(np.float32)
-        return wp.array(moved, dtype=wp.vec3, device=self.device)
+        return wp.array(self.shifted(points), dtype=wp.vec3, device=self.device)
+
+    def shifted(self, points: np.ndarray) -> np.ndarray:
+        """The same on the host, shape (n, 3) float32."""
+        return ((np.asarray(points, float) - self.centre) / self.unit).astype(np.float32)
+
+    def vectors(self, values: np.ndarray) -> wp.array:
+        """Directions, shape (n, 3), for kernels."""
+        return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
+
+    def back(self, points: wp.array) -> np.ndarray:
+        """Points in metres, shape (n, 3), from those in the frame and unit of the queries."""
+        return points.numpy() * self.unit + self.centre
+
+    @cached_property
+    def faces(self) -> tuple[wp.uint64, wp.array, wp.array]:
+        """The triangles for kernels: the copy that queries run on, its corners, and the normals."""
+        return self.mesh.id, self.mesh.points, self.vectors(self.normals)
 
     def closest(
         self, points: np.ndarray, limit: np.ndarray | float | None = None, up: np.ndarray | None = None
@@ -253,34 +270,3 @@ class Surface:
 
     def _launch(self, kernel, inputs: list, outputs: list) -> None:
         launch_shares(kernel, len(outputs[0]), [self.mesh.id, *inputs], outputs, self.device)
-
-
-def closest_on_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Closest point of one triangle to one point each, in double precision, also on triangles without area.
-
-    Args:
-        points: shape (n, 3) [m].
-        triangles: shape (n, 3, 3) [m].
-    """
-    best = None
-    for k in range(3):  # the three edges
-        a, along = triangles[:, k], triangles[:, (k + 1) % 3] - triangles[:, k]
-        square = np.einsum("ij,ij->i", along, along)
-        share = np.einsum("ij,ij->i", points - a, along) / np.where(square > 0.0, square, 1.0)
-        near = a + np.clip(share, 0.0, 1.0)[:, None] * along
-        far = np.einsum("ij,ij->i", points - near, points - near)
-        if best is None:
-            best, least = near, far
-        else:
-            better = far < least
-            best, least = np.where(better[:, None], near, best), np.where(better, far, least)
-    a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    normal = np.cross(u, v)
-    square = np.einsum("ij,ij->i", normal, normal)
-    safe = np.where(square > 0.0, square, 1.0)
-    out = points - a
-    p = np.einsum("ij,ij->i", np.cross(out, v), normal) / safe
-    q = np.einsum("ij,ij->i", np.cross(u, out), normal) / safe
-    inside = (square > 0.0) & (p >= 0.0) & (q >= 0.0) & (p + q <= 1.0)
-    foot = points - (np.einsum("ij,ij->i", out, normal) / safe)[:, None] * normal
-    return np.where(inside[:, None], foot, best)

@@ -16,6 +16,15 @@ def surface_samples(mesh, number=20000):
     return points, mesh.face_normals[face]
 
 
+def worst_place(mesh, points, number):
+    """How far from all points the surface lies at most; where random places are far, more are taken."""
+    places, face = trimesh.sample.sample_surface(mesh, number, seed=7)
+    far = distances(places, points)
+    worst = np.isin(np.arange(len(mesh.faces)), face[far > 0.9 * far.max()])
+    places, _ = trimesh.sample.sample_surface(mesh, 2 * number, face_weight=worst * mesh.area_faces, seed=8)
+    return max(far.max(), distances(places, points).max())
+
+
 def skin_gap(mesh, body):
     """Farthest place from the particles whose normals are within 134 degrees of its own, so not on the other skin of a wall."""
     points, normals = surface_samples(mesh)
@@ -42,9 +51,9 @@ def test_solids_are_covered_evenly(shape, count):
     assert near.std() / near.mean() <= (0.065 if shape == "box" else 0.05)
     assert near.min() >= (0.6 if shape == "box" else 0.75)
     assert near.max() <= 1.10
-    farthest = distances(surface_samples(mesh, 100 * count)[0], body.points).max()
+    farthest = worst_place(mesh, body.points, 100 * count)
     assert farthest <= 0.80 * h
-    assert body.evenness.coverage * body.spacing == pytest.approx(farthest, rel=0.08)
+    assert body.evenness.coverage * body.spacing == pytest.approx(farthest, rel=0.03)
     assert np.abs(SignedDistance(mesh).query(body.points)[0]).max() < 1e-3 * body.radius
 
 
