@@ -4,6 +4,7 @@ Warp has a hash grid, which divides for every cell it visits. Here a row of cell
 asked again and again each cell has a list of all particles near it.
 """
 
+import math
 from functools import partial
 
 import numpy as np
@@ -87,14 +88,34 @@ def empty_cells(points: np.ndarray, width: float) -> Cells:
 def sort_into_cells(points: np.ndarray, normals: np.ndarray, width: float, device: str) -> Cells:
     """Sort particles, shape (n, 3) float32, with their normals, shape (n, 3), into cells at least so wide."""
     cells = empty_cells(points, width)
-    size = np.array(cells.size)[:, None]
-    at = ((points - np.array(cells.low)) * np.float32(cells.per)).astype(int).T
-    cell = np.ravel_multi_index(np.minimum(at, size - 1)[::-1], size[::-1, 0])
+    cell = cell_numbers(cells, points)
     order = np.argsort(cell, kind="stable")
-    cells.begin = _integers(_ends(np.bincount(cell, minlength=size.prod())), device)
+    cells.begin = _integers(_ends(np.bincount(cell, minlength=math.prod(cells.size))), device)
     cells.which = _integers(order, device)
     cells.points, cells.normals = (wp.array(x[order].astype(np.float32), dtype=wp.vec3, device=device) for x in (points, normals))
     return cells
+
+
+def cell_numbers(cells: Cells, points: np.ndarray) -> np.ndarray:
+    """Number of the cell of each point, shape (n, 3) float32, outside of the grid that of the nearest one; shape (n,)."""
+    number = np.zeros(len(points), np.int64)
+    for axis in (2, 1, 0):
+        at = ((points[:, axis] - np.float32(cells.low[axis])) * np.float32(cells.per)).astype(np.int64)
+        number = number * cells.size[axis] + np.clip(at, 0, cells.size[axis] - 1)
+    return number
+
+
+def cells_around(cells: Cells, points: np.ndarray, reach: float) -> np.ndarray:
+    """Whether each cell may hold places within reach of any of the points, shape (n, 3); shape (number of cells,)."""
+    around = np.zeros(tuple(cells.size)[::-1], bool)
+    around.reshape(-1)[cell_numbers(cells, points)] = True
+    for axis in range(3):
+        once = around.copy()
+        for step in range(1, math.ceil(reach * cells.per) + 1):
+            ahead, behind = (np.moveaxis(x, axis, 0) for x in (around, once))
+            ahead[step:] |= behind[:-step]
+            ahead[:-step] |= behind[step:]
+    return around.reshape(-1)
 
 
 def add_lists(cells: Cells, reach: float, device: str) -> None:

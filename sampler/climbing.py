@@ -59,9 +59,7 @@ def climb_from(
 def climb(
     skin: Skin,
     cells: Cells,
-    points: np.ndarray,
-    normals: np.ndarray,
-    found: np.ndarray,
+    known: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     along: bool,
     steps: int,
     spacing: float,
@@ -73,27 +71,26 @@ def climb(
     Args:
         skin: where they lie.
         cells: the particles, with lists.
-        points: places to begin with, shape (n, 3) [m].
-        normals: of the surface there, shape (n, 3).
-        found: the particles nearest to them, shape (n,) of ``Nearest``.
+        known: places to begin with, shape (n, 3) float32, the normals there, shape (n, 3), the particles nearest to them, shape
+            (n,), and how far these are, shape (n,), in spacings.
         along: whether ways along the surface are meant.
         steps: how many, each shorter than that before.
-        spacing: of the particles [m].
+        spacing: of the particles, in the kernels' unit as all places.
         most: how far particles are looked for, in spacings.
         random: where chance comes from.
 
     Returns:
-        The worst places, shape (m, 3) [m], the normals there, shape (m, 3), and their distances, shape (m,), in spacings.
+        The worst places, shape (m, 3) float32, the normals there, shape (m, 3), and their distances, shape (m,), in spacings.
     """
-    which, way = found["which"], found["way"]
-    known = min(_KNOWN * _STARTS, len(points))
-    order = np.argpartition(-way, known - 1)[:known]
+    points, normals, which, way = known
+    number = min(_KNOWN * _STARTS, len(points))
+    order = np.argpartition(-way, number - 1)[:number]
     order = order[np.argsort(-way[order], kind="stable")]
     cell = merge_points(np.floor(points[order] / (_CELL * spacing)))
-    first = np.unique(which[order].astype(np.int64) * known + cell, return_index=True)[1]
+    first = np.unique(which[order].astype(np.int64) * number + cell, return_index=True)[1]
     chosen = order[np.sort(first)[:_STARTS]]
-    places, up = skin.shift(points[chosen]), skin.vectors(normals[chosen])
-    ways = wp.array(way[chosen].astype(np.float32), dtype=float, device=skin.device)
-    options = [spacing / skin.unit, most, int(along), steps, int(random.integers(2**31))]
+    places, up = (wp.array(x[chosen], dtype=wp.vec3, device=skin.device) for x in (points, normals))
+    ways = wp.array(way[chosen], dtype=float, device=skin.device)
+    options = [spacing, most, int(along), steps, int(random.integers(2**31))]
     launch_shares(climb_from, len(chosen), [cells, *skin.faces, *options], [places, up, ways], skin.device)
-    return skin.back(places), up.numpy().astype(float), ways.numpy()
+    return places.numpy(), up.numpy(), ways.numpy()

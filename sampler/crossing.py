@@ -9,7 +9,7 @@ from sampler.surface import Surface
 _RIM = 1.0e-6  # of the diagonal: what only meets the rim of a piece, as its neighbours do, does not count
 _PARALLEL = 0.99  # cosine of the angle between triangles from which one that does not split the other may still cover part of it
 
-# The other triangle, clipped by the planes through the edges of the piece and by one before and one behind it: is anything left?
+# The other triangle, clipped by the planes through the edges of the piece and by two along it: is anything left?
 _REACHES = """
     using namespace wp;
     const vec3 piece[3] = {vec3(0.0f), b - a, c - a};
@@ -19,7 +19,7 @@ _REACHES = """
     for (int side = 0; side < 5 && count; ++side) {
         const vec3 along = piece[(side + 1) % 3] - piece[side % 3];
         const vec3 inward = side == 3 ? normal : (side == 4 ? -normal : normalize(cross(normal, along)));
-        const float level = side < 3 ? dot(inward, piece[side]) + rim : -near;
+        const float level = side < 3 ? dot(inward, piece[side]) + rim : (side == 3 ? least : -most);
         vec3 kept[8];
         int number = 0;
         for (int k = 0; k < count; ++k) {
@@ -36,8 +36,10 @@ _REACHES = """
 
 
 @wp.func_native(_REACHES)
-def reaches(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3, q: wp.vec3, r: wp.vec3, rim: float, near: float) -> bool:
-    """Whether any of the triangle p, q, r lies over the inside of the triangle a, b, c, nearer to its plane than ``near``."""
+def reaches(
+    a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3, q: wp.vec3, r: wp.vec3, rim: float, least: float, most: float
+) -> bool:
+    """Whether any of the triangle p, q, r lies over the inside of the triangle a, b, c, between two heights over its plane."""
     ...
 
 
@@ -87,9 +89,29 @@ def find_crossing(mesh: wp.uint64, corners: wp.array(dtype=wp.vec3), near: float
             q = points[3 * face + 1]
             r = points[3 * face + 2]
             plane = splitting_plane(a, b, c, p, q, r, near)
-            if plane >= 0 and reaches(a, b, c, p, q, r, _RIM, near):
+            if plane >= 0 and reaches(a, b, c, p, q, r, _RIM, -near, near):
                 best = 4 * face + plane
     found[i] = best
+
+
+@wp.kernel(enable_backward=False, module="sampler_crossing")
+def find_before(
+    mesh: wp.uint64, corners: wp.array(dtype=wp.vec3), least: float, most: float, first: int, found: wp.array(dtype=int)
+):
+    """Whether any of the mesh lies before each piece, between two heights over it."""
+    i = first + wp.tid()
+    a = corners[3 * i]
+    b = corners[3 * i + 1]
+    c = corners[3 * i + 2]
+    up = most * wp.normalize(wp.cross(b - a, c - a))
+    low = wp.min(wp.min(a, b), c)
+    high = wp.max(wp.max(a, b), c)
+    points = wp.mesh_get(mesh).points
+    any = int(0)
+    for face in wp.mesh_query_aabb(mesh, wp.min(low, low + up), wp.max(high, high + up)):
+        if any == 0 and reaches(a, b, c, points[3 * face], points[3 * face + 1], points[3 * face + 2], _RIM, least, most):
+            any = 1
+    found[i] = any
 
 
 @wp.kernel(enable_backward=False, module="sampler_crossing")
@@ -141,6 +163,14 @@ def count_layers(points: np.ndarray, normals: np.ndarray, around: Surface, near:
     inputs = [around.mesh.id, around.shift(points), up, near / around.unit]
     launch_shares(find_layers, len(points), inputs, [layers], around.device)
     return layers.numpy()
+
+
+def have_before(pieces: np.ndarray, around: Surface, least: float, most: float) -> np.ndarray:
+    """Whether any of a surface lies before parts of its triangles, shape (n, 3, 3) [m], between two heights [m]; shape (n,)."""
+    found = wp.empty(len(pieces), dtype=int, device=around.device)
+    inputs = [around.mesh.id, around.shift(pieces.reshape(-1, 3)), least / around.unit, most / around.unit]
+    launch_shares(find_before, len(pieces), inputs, [found], around.device)
+    return found.numpy() > 0
 
 
 def crossing_planes(pieces: np.ndarray, around: Surface, near: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -34,5 +34,5 @@ def _worst_place(gaps: Gaps, along: bool, most: float, random: np.random.Generat
     far = np.flatnonzero(found["way"] >= FAR)
     far = far[:: 1 + len(far) // _SURVEYED]
     found[far] = gaps.measure(gaps.places.points[far], gaps.places.normals[far], most)[along]
-    worst = gaps.climb(gaps.places, along, _STEPS, random, most)[2].max()
+    worst = gaps.climb(along, _STEPS, random, most)[2].max()
     return worst if worst < most else np.inf

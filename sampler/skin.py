@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sampler.crossing import count_layers, crossing_planes, cut_triangles
+from sampler.crossing import count_layers, crossing_planes, cut_triangles, have_before
 from sampler.surface import Surface
 from sampler.topology import link_items
 
@@ -78,11 +78,14 @@ class Skin(Surface):
         """
         share = np.cumsum(self.areas if weight is None else weight)
         at = (np.arange(number) + random.random(number)) / number * share[-1]
-        face = np.minimum(np.searchsorted(share, at), len(share) - 1)
-        u = random.random((number, 2))
-        u = np.where(u[:, :1] + u[:, 1:] > 1.0, 1.0 - u, u)
-        corner = self.triangles[face]
-        points = corner[:, 0] + u[:, :1] * (corner[:, 1] - corner[:, 0]) + u[:, 1:] * (corner[:, 2] - corner[:, 0])
+        ends = np.searchsorted(at, share, side="right")
+        ends[-1] = number
+        face = np.repeat(np.arange(len(share)), np.diff(ends, prepend=0))
+        u, v = random.random((2, number, 1))
+        turned = u + v > 1.0
+        u, v = np.where(turned, 1.0 - u, u), np.where(turned, 1.0 - v, v)
+        a, b, c = self.triangles.transpose(1, 0, 2)
+        points = a[face] + u * (b - a)[face] + v * (c - a)[face]
         return points, self.normals[face]
 
 
@@ -183,8 +186,9 @@ def _outside_slits(triangles: np.ndarray, solid: Surface, spacing: float) -> np.
     places, normals = Skin(triangles).sample(_TRIAL, np.random.default_rng(0))
     if np.all(np.abs(winding_before(places, normals, solid, step)) < 0.5):
         return triangles
-    outside = triangles.mean(axis=1) + _STEP * solid.unit * Surface.normals_of(triangles)  # they were judged free there
-    pieces, parent = triangles, np.arange(len(triangles))
+    parent = np.flatnonzero(have_before(triangles, solid, 0.5 * _STEP * solid.unit, step * solid.unit))
+    pieces = triangles[parent]
+    outside = pieces.mean(axis=1) + _STEP * solid.unit * Surface.normals_of(pieces)  # they were judged free there
     whole, parts = np.ones(len(triangles), bool), [(triangles[:0], parent[:0])]
     while len(pieces):
         size = np.minimum(longest_edges(pieces), _WIDE * np.sqrt(Surface.areas_of(pieces)))  # needles would become very many

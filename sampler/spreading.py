@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 
 from sampler.cells import empty_cells, sort_into_cells
-from sampler.gaps import Gaps, Verdict
+from sampler.gaps import Gaps, Verdict, within
 from sampler.lattice import lattice_spacing
 from sampler.launching import launch_shares
 from sampler.skin import Skin
@@ -118,7 +118,7 @@ class _State:
             self.observe(self.positions())
 
     def positions(self) -> np.ndarray:
-        return self.skin.back(self.points)[: self.number]
+        return self.skin.back(self.points.numpy()[: self.number])
 
     def result(self) -> tuple[np.ndarray, np.ndarray]:
         points, face = self.skin.closest(self.positions(), 0.1 * self.spacing, up=self.normals.numpy()[: self.number])
@@ -130,14 +130,14 @@ class _State:
         Only what is near moves afterwards.
         """
         places, crowded = verdict.points, len(verdict.crowded)
-        taken: list[int] = []
+        taken, gone = [], places
         added = max(0, min(self.most - len(points), len(places)))
         for rank, k in enumerate([*verdict.crowded, *np.argsort(verdict.missed, kind="stable")]):
             if len(taken) == len(places) or (rank >= crowded and len(taken) >= len(places) - added):
                 break
-            way = np.linalg.norm(np.concatenate([places, points[taken]]) - points[k], axis=1).min()
-            if (rank < crowded or not self.pinned[k]) and way > 2.0 * self.spacing:
+            if (rank < crowded or not self.pinned[k]) and not within(gone, points[k], 2.0 * self.spacing).any():
                 taken.append(int(k))
+                gone = np.concatenate([gone, points[k : k + 1]])
         filled = min(len(places), len(taken) + added)
         changed = np.concatenate([places[:filled], points[taken]])
         where = np.append(taken, np.arange(len(points), len(points) + filled - len(taken))).astype(int)
@@ -147,7 +147,7 @@ class _State:
         points[where], normals[where], self.pinned[where] = places[:filled], verdict.normals[:filled], pin
         moving = np.zeros(len(points), bool)
         for place in changed:
-            moving |= np.linalg.norm(points - place, axis=1) < _AROUND * self.spacing
+            moving |= within(points, place, _AROUND * self.spacing)
         self.place(points, normals, self.pinned | ~moving)
 
 

@@ -194,9 +194,9 @@ class Surface:
         """Directions, shape (n, 3), for kernels."""
         return wp.array(np.asarray(values, np.float32), dtype=wp.vec3, device=self.device)
 
-    def back(self, points: wp.array) -> np.ndarray:
-        """Points in metres, shape (n, 3), from those in the frame and unit of the queries."""
-        return points.numpy() * self.unit + self.centre
+    def back(self, points: np.ndarray) -> np.ndarray:
+        """Points [m] from those in the frame and unit of the queries, shape (n, 3)."""
+        return points * self.unit + self.centre
 
     @cached_property
     def faces(self) -> tuple[wp.uint64, wp.array, wp.array]:

@@ -49,7 +49,7 @@ def test_what_moves_is_measured_anew():
         points[random.permutation(len(points))[:moved]] = where
         points = np.concatenate([points, scatter(random, 2)[0]])
         gaps.look(points, np.tile(up[0], (len(points), 1)))
-        first = np.linalg.norm(gaps.places.points[:, None] - points, axis=2).min(axis=1) / gaps.spacing
+        first = np.linalg.norm(gaps.skin.back(gaps.places.points)[:, None] - points, axis=2).min(axis=1) / gaps.spacing
         assert gaps.places.closest["way"] == pytest.approx(np.minimum(first, 2.0), abs=1e-5)
         assert gaps.neighbour_distances().shape == (len(points),)
 

@@ -63,7 +63,7 @@ def test_ways_lead_around_edges(angle):
     gaps = Gaps(Skin(triangles), 2.0)
     for place, point, flat in zip(places, points, unfolded, strict=True):
         gaps.look(point[None], other[None])
-        closest, own = gaps.measure(place[None], up[None])
+        closest, own = gaps.measure(gaps.skin.shifted(place[None]), up[None].astype(np.float32))
         assert closest["way"][0] == pytest.approx(np.linalg.norm(place - point) / 2.0, abs=1e-4)
         wanted = np.linalg.norm(place - (point if straight else flat)) / 2.0
         assert own["way"][0] == pytest.approx(wanted, abs=1e-3)
