@@ -6,28 +6,75 @@ from sampler.cells import Cells, cell_at, row_of
 
 MODULE = "sampler_spreading"
 
-SAME = wp.constant(-0.2)  # cosine between normals from which two places lie on one skin
-_SEEN = wp.constant(5.0e-5)  # least width of a gap
-_NARROW = wp.constant(0.05)  # gaps narrower than this count as closed, so that either skin's particles cover both; in spacings
+SAME = -0.2  # cosine between normals from which two places lie on one skin
+_SEEN = 5.0e-5  # least width of a gap
+_NARROW = 0.05  # gaps narrower than this count as closed, so that either skin's particles cover both; in spacings
+
+# The way between places of a surface is straight on one skin, and where they look at each other across a narrow gap. Else it
+# leads around the edge where their planes meet: unfolded, its square is ``|b|^2 + 2 (|p| + p c) / (1 - c^2)`` with ``b`` from one
+# to the other, ``p = (b . up) (b . other)`` and ``c = up . other``. Between the two skins of a wall it is very far.
+# Many particles are measured at once, in vectors and without branches, which would be guessed wrong.
+_NEAREST = f"""
+    const int most = 64;
+    const float gap = {_NARROW}f * spacing;
+    float straight[most], along[most];
+    wp::vec_t<6, float> best = before;
+    for (int start = begin; start < end; start += most) {{
+        const int count = end - start < most ? end - start : most;
+        float x[most], y[most], z[most], u[most], v[most], w[most];
+        for (int i = 0; i < count; ++i) {{
+            const int k = listed ? list[start + i] : start + i;
+            const wp::vec3 p = points[k], n = normals[k];
+            x[i] = p[0] - here[0]; y[i] = p[1] - here[1]; z[i] = p[2] - here[2];
+            u[i] = n[0]; v[i] = n[1]; w[i] = n[2];
+        }}
+        #ifndef __CUDA_ARCH__
+        _Pragma("clang loop vectorize(enable)")
+        #endif
+        for (int i = 0; i < count; ++i) {{
+            const float square = x[i] * x[i] + y[i] * y[i] + z[i] * z[i];
+            const float forth = x[i] * up[0] + y[i] * up[1] + z[i] * up[2], back = -x[i] * u[i] - y[i] * v[i] - z[i] * w[i];
+            const float cosine = up[0] * u[i] + up[1] * v[i] + up[2] * w[i], turn = 1.0f - cosine * cosine;
+            const float product = -forth * back, size = product < 0.0f ? -product : product;
+            const float detour = turn < 1.0e-4f ? 1.0e6f : 2.0f * (size + product * cosine) / turn;
+            const float less = forth < back ? forth : back, more = forth < back ? back : forth;
+            const bool one = cosine > {SAME}f || (less > {_SEEN}f && more < gap);
+            straight[i] = square;
+            along[i] = square + (one ? 0.0f : detour);
+        }}
+        for (int kind = 0; kind < 2; ++kind) {{
+            const float* way = kind ? along : straight;
+            float nearest = best[3 * kind], next = best[3 * kind + 1], which = best[3 * kind + 2];
+            for (int i = 0; i < count; ++i) {{
+                if (way[i] < nearest) {{
+                    next = nearest < next ? nearest : next;
+                    nearest = way[i];
+                    which = listed ? list[start + i] : start + i;
+                }} else if (way[i] < next) next = way[i];
+            }}
+            best[3 * kind] = nearest; best[3 * kind + 1] = next; best[3 * kind + 2] = which;
+        }}
+    }}
+    return best;
+"""
+_Found = wp.types.vector(length=6, dtype=float)  # square of the way to the nearest, and to the next, its rank; along the surface
 
 
-@wp.func
-def square_along(between: wp.vec3, up: wp.vec3, other: wp.vec3, gap: float) -> float:
-    """Square of the way between places of a surface, given that from the first to the second, and their normals.
-
-    Straight on one skin, and where they look at each other across a gap at most so wide; else around the edge where their planes
-    meet: unfolded, that is ``|between|^2 + 2 (|p| + p c) / (1 - c^2)`` with ``p = (between . up) (between . other)`` and
-    ``c = up . other``; and very far between the two skins of a wall. Without branches, which would be guessed wrong.
-    """
-    forth = wp.dot(between, up)
-    back = -wp.dot(between, other)
-    cosine = wp.dot(up, other)
-    facing = wp.min(wp.min(forth, back) - _SEEN, gap - wp.max(forth, back))
-    straight = wp.dot(between, between)
-    turn = 1.0 - cosine * cosine
-    p = -forth * back
-    around = straight + wp.where(turn < 1.0e-4, 1.0e6, 2.0 * (wp.abs(p) + p * cosine) / turn)
-    return wp.where(wp.max(cosine - SAME, facing) > 0.0, straight, around)
+@wp.func_native(_NEAREST)
+def nearest_of(
+    points: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    list: wp.array(dtype=int),
+    listed: bool,
+    begin: int,
+    end: int,
+    here: wp.vec3,
+    up: wp.vec3,
+    spacing: float,
+    before: _Found,
+) -> _Found:
+    """The nearest particles of those found before and of some ranks, from a list or themselves from a first to a last."""
+    ...
 
 
 @wp.struct
@@ -40,53 +87,38 @@ class Nearest:
 
 
 @wp.func
-def nearer(nearest: Nearest, which: int, way: float) -> Nearest:
-    """The nearest of those met before and this one."""
-    first = wp.where(way < nearest.way, which, nearest.which)
-    return Nearest(first, wp.min(way, nearest.way), wp.min(nearest.next, wp.max(way, nearest.way)))
-
-
-@wp.func
 def nearest_particles(cells: Cells, here: wp.vec3, up: wp.vec3, spacing: float, most: float):
     """Particle nearest to a place, and the nearest one along the surface, in spacings; at most ``most``, the next at most 1."""
-    none = Nearest(int(-1), most * most * spacing * spacing, spacing * spacing)
-    closest = none
-    own = none
-    reach = spacing  # squares of ways in what follows
+    far = most * most * spacing * spacing
+    none = _Found(far, spacing * spacing, -1.0, far, spacing * spacing, -1.0)
     cell = cell_at(cells, here)
     number = row_of(cells, cell[1], cell[2]) + cell[0]
-    for at in range(cells.near_begin[number], cells.near_begin[number + 1]):
-        k = cells.near[at]
-        between = cells.points[k] - here
-        square = wp.dot(between, between)
-        if square < wp.max(own.way, own.next):  # the way along the surface is no shorter
-            closest = nearer(closest, k, square)
-            own = nearer(own, k, square_along(between, up, cells.normals[k], _NARROW * spacing))
-    while own.way > reach * reach and reach < most * spacing:  # next to never
+    begin = cells.near_begin[number]
+    end = cells.near_begin[number + 1]
+    best = nearest_of(cells.points, cells.normals, cells.near, True, begin, end, here, up, spacing, none)
+    reach = spacing
+    while best[3] > reach * reach and reach < most * spacing:  # next to never
         reach = wp.min(2.0 * reach, most * spacing)
-        closest = none
-        own = none
+        best = none
         low = cell_at(cells, here - wp.vec3(reach))
         high = cell_at(cells, here + wp.vec3(reach))
         for z in range(low[2], high[2] + 1):
             for y in range(low[1], high[1] + 1):
                 row = row_of(cells, y, z)
-                for k in range(cells.begin[row + low[0]], cells.begin[row + high[0] + 1]):
-                    between = cells.points[k] - here
-                    square = wp.dot(between, between)
-                    if square < wp.max(own.way, own.next):
-                        closest = nearer(closest, k, square)
-                        own = nearer(own, k, square_along(between, up, cells.normals[k], _NARROW * spacing))
-    return in_spacings(cells, closest, spacing), in_spacings(cells, own, spacing)
+                begin = cells.begin[row + low[0]]
+                end = cells.begin[row + high[0] + 1]
+                best = nearest_of(cells.points, cells.normals, cells.near, False, begin, end, here, up, spacing, best)
+    closest = in_spacings(cells, best[2], best[0], best[1], spacing)
+    return closest, in_spacings(cells, best[5], best[3], best[4], spacing)
 
 
 @wp.func
-def in_spacings(cells: Cells, nearest: Nearest, spacing: float) -> Nearest:
-    """The number of a particle in place of its rank, and ways in spacings in place of their squares."""
-    which = nearest.which
+def in_spacings(cells: Cells, rank: float, way: float, next: float, spacing: float) -> Nearest:
+    """A particle by its number, and ways in spacings from their squares."""
+    which = int(rank)
     if which >= 0:
         which = cells.which[which]
-    return Nearest(which, wp.sqrt(nearest.way) / spacing, wp.sqrt(nearest.next) / spacing)
+    return Nearest(which, wp.sqrt(way) / spacing, wp.sqrt(next) / spacing)
 
 
 @wp.kernel(enable_backward=False, module=MODULE)

@@ -20,23 +20,25 @@ _NEAREST = """
     const Mesh mesh = mesh_get(id);
     const vec3d side(up[0], up[1], up[2]);
     int stack[BVH_QUERY_STACK_SIZE];
+    float reached[BVH_QUERY_STACK_SIZE];
     int count = 1, best = -1;
     stack[0] = *mesh.bvh.root;
+    reached[0] = 0.0f;
     double least = (double)limit * limit;
     while (count) {
         const int node = stack[--count];
+        if (reached[count] > least * 1.000001) continue;
         const BVHPackedNodeHalf low = bvh_load_node(mesh.bvh.node_lowers, node);
         const BVHPackedNodeHalf high = bvh_load_node(mesh.bvh.node_uppers, node);
-        if (distance_to_aabb_sq(p, vec3(low.x, low.y, low.z), vec3(high.x, high.y, high.z)) > least * 1.000001) continue;
         if (low.b) {
             for (int k = low.i; k < (int)high.i; ++k) {
                 const int face = mesh.bvh.primitive_indices[k];
+                const vec3 x = mesh.points[3 * face], y = mesh.points[3 * face + 1], z = mesh.points[3 * face + 2];
+                if (distance_to_aabb_sq(p, wp::min(wp::min(x, y), z), wp::max(wp::max(x, y), z)) > least * 1.000001) continue;
                 const vec3d point(p[0], p[1], p[2]);
-                vec3d corner[3];
-                for (int c = 0; c < 3; ++c) {
-                    const vec3 x = mesh.points[mesh.indices[3 * face + c]];
-                    corner[c] = vec3d(x[0], x[1], x[2]) - point;
-                }
+                const vec3d corner[3] = {
+                    vec3d(x[0], x[1], x[2]) - point, vec3d(y[0], y[1], y[2]) - point, vec3d(z[0], z[1], z[2]) - point
+                };
                 const vec3d u = corner[1] - corner[0], v = corner[2] - corner[0], n = cross(u, v);
                 const double area = dot(n, n);
                 double distance = 1e300;
@@ -63,9 +65,11 @@ _NEAREST = """
             const BVHPackedNodeHalf bh = bvh_load_node(mesh.bvh.node_uppers, high.i);
             const float a = distance_to_aabb_sq(p, vec3(al.x, al.y, al.z), vec3(ah.x, ah.y, ah.z));
             const float b = distance_to_aabb_sq(p, vec3(bl.x, bl.y, bl.z), vec3(bh.x, bh.y, bh.z));
-            const int nearer = a < b ? low.i : high.i, farther = a < b ? high.i : low.i;
-            if ((a < b ? b : a) <= least * 1.000001) stack[count++] = farther;
-            if ((a < b ? a : b) <= least * 1.000001) stack[count++] = nearer;
+            const bool first = a < b;
+            stack[count] = first ? high.i : low.i;
+            reached[count++] = first ? b : a;
+            stack[count] = first ? low.i : high.i;
+            reached[count++] = first ? a : b;
         }
     }
     return best;
