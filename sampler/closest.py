@@ -67,3 +67,8 @@ def closest_on_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarra
     inside = (square > 0.0) & (p >= 0.0) & (q >= 0.0) & (p + q <= 1.0)
     foot = points - (np.einsum("ij,ij->i", out, normal) / safe)[:, None] * normal
     return np.where(inside[:, None], foot, best)
+
+
+def lengths(vectors: np.ndarray) -> np.ndarray:
+    """Of vectors, shape (..., 3), several times as fast as NumPy's norm; shape (...)."""
+    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))

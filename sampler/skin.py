@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sampler.closest import lengths
 from sampler.crossing import count_layers, crossing_planes, cut_triangles, have_before
 from sampler.surface import Surface
 from sampler.topology import link_items
@@ -168,7 +169,8 @@ def coinciding_layers(triangles: np.ndarray, solid: Surface) -> np.ndarray:
 
 def longest_edges(triangles: np.ndarray) -> np.ndarray:
     """Of each triangle, shape (n, 3, 3) [m]; shape (n,) [m]."""
-    return np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2).max(axis=1)
+    a, b, c = lengths(triangles - triangles[:, [1, 2, 0]]).T
+    return np.maximum(np.maximum(a, b), c)
 
 
 def _folds(triangles: np.ndarray, solid: Surface) -> np.ndarray:
@@ -267,6 +269,6 @@ def halve_triangles(triangles: np.ndarray) -> np.ndarray:
 
 def _longest_edge_first(triangles: np.ndarray) -> np.ndarray:
     """Corners of triangles, shape (n, 3, 3) [m], the longest edge from the first to the second; shape (3, n, 3)."""
-    edge = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
+    edge = lengths(triangles - triangles[:, [1, 2, 0]])
     turn = (edge.argmax(axis=1)[:, None] + np.arange(3)) % 3
     return np.moveaxis(np.take_along_axis(triangles, turn[:, :, None], axis=1), 1, 0)

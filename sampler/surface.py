@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 import warp as wp
 
-from sampler.closest import closest_on_triangles
+from sampler.closest import closest_on_triangles, lengths
 from sampler.launching import launch_shares
 from sampler.rays import closing_cones, count_windings, leavings_between
 
@@ -177,14 +177,13 @@ class Surface:
     @staticmethod
     def areas_of(triangles: np.ndarray) -> np.ndarray:
         """Areas of triangles, shape (n, 3, 3) [m]."""
-        return 0.5 * np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+        return _upright(triangles)[1]
 
     @staticmethod
     def normals_of(triangles: np.ndarray) -> np.ndarray:
         """Unit normals of triangles, shape (n, 3, 3) [m]; zero where they have no area."""
-        cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        length = np.linalg.norm(cross, axis=1, keepdims=True)
-        return np.divide(cross, length, out=np.zeros_like(cross), where=length > 0.0)
+        cross, area = _upright(triangles)
+        return np.divide(0.5 * cross, area[:, None], out=np.zeros_like(cross), where=area[:, None] > 0.0)
 
     def shift(self, points: np.ndarray) -> wp.array:
         """Points in the frame and unit of the queries."""
@@ -274,3 +273,9 @@ class Surface:
 
     def _launch(self, kernel, inputs: list, outputs: list) -> None:
         launch_shares(kernel, len(outputs[0]), [self.mesh.id, *inputs], outputs, self.device)
+
+
+def _upright(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normals of triangles, shape (n, 3, 3) [m], twice as long as their areas [m^2], and these."""
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return cross, 0.5 * lengths(cross)
