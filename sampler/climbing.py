@@ -15,7 +15,6 @@ _STARTS = 150  # places to climb from
 _CELL = 0.5  # of those with the same particle nearest one in each cell of so many spacings, so that they lie in many gaps
 _KNOWN = 20  # the worst places among which they are chosen, per start
 _FIRST, _SHORTER = wp.constant(0.12), wp.constant(0.7)  # length of the first step, in spacings, and of each next, of that before
-_TRIALS = wp.constant(4)  # places tried in each step
 _BACK = wp.constant(1.0e-4)  # of the diagonal: how much farther than they went places are sought back
 
 
@@ -29,6 +28,7 @@ def climb_from(
     most: float,
     along: int,
     steps: int,
+    trials: int,
     seed: int,
     first: int,
     places: wp.array(dtype=wp.vec3),
@@ -42,7 +42,7 @@ def climb_from(
     for _ in range(steps):
         here = places[i]
         up = normals[i]
-        for _ in range(_TRIALS):
+        for _ in range(trials):
             aside = length * wp.vec3(wp.randn(random), wp.randn(random), wp.randn(random))
             face = nearest_face(mesh, here + aside, 1.01 * wp.length(aside) + _BACK, up, ASIDE)
             if face >= 0:
@@ -61,7 +61,7 @@ def climb(
     cells: Cells,
     known: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     along: bool,
-    steps: int,
+    steps: tuple[int, int],
     spacing: float,
     most: float,
     random: np.random.Generator,
@@ -74,7 +74,7 @@ def climb(
         known: places to begin with, shape (n, 3) float32, the normals there, shape (n, 3), the particles nearest to them, shape
             (n,), and how far these are, shape (n,), in spacings.
         along: whether ways along the surface are meant.
-        steps: how many, each shorter than that before.
+        steps: how many, each shorter than that before; and the best of how many trials each is.
         spacing: of the particles, in the kernels' unit as all places.
         most: how far particles are looked for, in spacings.
         random: where chance comes from.
@@ -91,6 +91,6 @@ def climb(
     chosen = order[np.sort(first)[:_STARTS]]
     places, up = (wp.array(x[chosen], dtype=wp.vec3, device=skin.device) for x in (points, normals))
     ways = wp.array(way[chosen], dtype=float, device=skin.device)
-    options = [spacing, most, int(along), steps, int(random.integers(2**31))]
+    options = [spacing, most, int(along), *steps, int(random.integers(2**31))]
     launch_shares(climb_from, len(chosen), [cells, *skin.faces, *options], [places, up, ways], skin.device)
     return places.numpy(), up.numpy(), ways.numpy()

@@ -23,15 +23,20 @@ _NEAREST = f"""
         const int count = end - start < most ? end - start : most;
         float x[most], y[most], z[most], u[most], v[most], w[most];
         for (int i = 0; i < count; ++i) {{
-            const int k = listed ? list[start + i] : start + i;
+            const int k = listed ? chosen[start + i] : start + i;
             const wp::vec3 p = points[k], n = normals[k];
             x[i] = p[0] - here[0]; y[i] = p[1] - here[1]; z[i] = p[2] - here[2];
             u[i] = n[0]; v[i] = n[1]; w[i] = n[2];
         }}
+        const int full = (count + 7) & ~7;
+        for (int i = count; i < full; ++i) {{
+            x[i] = 1.0e3f; y[i] = z[i] = 0.0f;
+            u[i] = v[i] = w[i] = 0.0f;
+        }}
         #ifndef __CUDA_ARCH__
-        _Pragma("clang loop vectorize(enable)")
+        _Pragma("clang loop vectorize(enable) interleave_count(1)")
         #endif
-        for (int i = 0; i < count; ++i) {{
+        for (int i = 0; i < full; ++i) {{
             const float square = x[i] * x[i] + y[i] * y[i] + z[i] * z[i];
             const float forth = x[i] * up[0] + y[i] * up[1] + z[i] * up[2], back = -x[i] * u[i] - y[i] * v[i] - z[i] * w[i];
             const float cosine = up[0] * u[i] + up[1] * v[i] + up[2] * w[i], turn = 1.0f - cosine * cosine;
@@ -49,7 +54,7 @@ _NEAREST = f"""
                 if (way[i] < nearest) {{
                     next = nearest < next ? nearest : next;
                     nearest = way[i];
-                    which = listed ? list[start + i] : start + i;
+                    which = listed ? chosen[start + i] : start + i;
                 }} else if (way[i] < next) next = way[i];
             }}
             best[3 * kind] = nearest; best[3 * kind + 1] = next; best[3 * kind + 2] = which;
@@ -64,7 +69,7 @@ _Found = wp.types.vector(length=6, dtype=float)  # square of the way to the near
 def nearest_of(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
-    list: wp.array(dtype=int),
+    chosen: wp.array(dtype=int),
     listed: bool,
     begin: int,
     end: int,

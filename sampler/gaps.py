@@ -12,7 +12,7 @@ from sampler.launching import launch_shares
 from sampler.skin import Skin
 
 _WATCHED = 0.15  # places that were found so near to being a gap are looked at the next time, too, in spacings
-_STEPS = 8  # from the worst places known to the worst ones near by
+_STEPS = 8, 4  # from the worst places known to the worst ones near by, and trials for each
 _GAP = 0.785, 0.965  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
 _GRAVE, _WEIGHT = (0.785, 0.99), 4.0  # and from these ways on a grave one; that, and loneliness, counts so much more
 _GAPS_APART = 1.2  # gaps nearer than this to a deeper one wait, in spacings
@@ -156,7 +156,7 @@ class Gaps:
         return tuple(values.numpy() for values in found)
 
     def climb(
-        self, along: bool, steps: int, random: np.random.Generator, most: float = FAR
+        self, along: bool, steps: tuple[int, int], random: np.random.Generator, most: float = FAR
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Worst places near the worst ones known, in the kernels' unit, the normals there, and how far they are, as ``climb``."""
         found = self.places.own if along else self.places.closest

@@ -9,7 +9,7 @@ from sampler.skin import Skin
 
 _MEASURED = 50  # places per particle, over the area, and as many over the edges
 _SURVEYED = 5000  # of the places that have none near, so many are asked where it is
-_STEPS = 16  # from the worst of them to the worst ones near by
+_STEPS = 16, 8  # from the worst of them to the worst ones near by, and trials for each
 
 
 def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Evenness:

@@ -42,10 +42,12 @@ _PUSH = f"""
                 u[count] = n[0]; v[count] = n[1]; w[count] = n[2];
             }}
             if (count < most && !last) break;
+            const int full = (count + 7) & ~7;
+            for (int c = count; c < full; ++c) x[c] = y[c] = z[c] = u[c] = v[c] = w[c] = 0.0f;
             #ifndef __CUDA_ARCH__
-            _Pragma("clang loop vectorize(enable)")
+            _Pragma("clang loop vectorize(enable) interleave_count(1)")
             #endif
-            for (int c = 0; c < count; ++c) {{
+            for (int c = 0; c < full; ++c) {{
                 const float square = x[c] * x[c] + y[c] * y[c] + z[c] * z[c], way = sqrtf(square);
                 float near = 1.0f - shape * square;  // and to the power of 256: a Gaussian without an exponential
                 near *= near; near *= near; near *= near; near *= near; near *= near; near *= near; near *= near; near *= near;

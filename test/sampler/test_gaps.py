@@ -71,3 +71,18 @@ def test_the_worst_gap_is_found_from_few_places(seed):
     assert known < 0.97
     assert gaps.places.closest["way"].max() == pytest.approx(1.0, abs=0.025)
     assert np.linalg.norm(verdict.points[0] - missing) < 0.03 * gaps.spacing
+
+
+def test_particles_are_found_however_far_they_are_scattered():
+    """In far more cells than there may be, so in wider ones."""
+    random = np.random.default_rng(3)
+    gaps = Gaps(Skin(np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]])), 0.002)
+    points, places = random.random((50, 3)), random.random((200, 3))
+    up = np.tile([0.0, 0.0, 1.0], (200, 1))
+    gaps.look(points, up[:50])
+    far = np.linalg.norm(places[:, None] - points, axis=2)
+    for found in gaps.measure(gaps.skin.shifted(places), up.astype(np.float32), 1000.0):
+        assert found["way"] * 0.002 == pytest.approx(far.min(axis=1), abs=1e-5)
+        assert np.array_equal(found["which"], far.argmin(axis=1))
+    apart = np.linalg.norm(points[:, None] - points, axis=2) + 2.0 * np.eye(50)
+    assert gaps.neighbour_distances(1000.0) * 0.002 == pytest.approx(apart.min(axis=1), abs=1e-5)
