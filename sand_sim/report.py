@@ -23,6 +23,7 @@ def summary_text(summary: dict) -> str:
     if not summary.get("steps"):
         return "nothing was simulated"
     energy = summary["energy_J"]
+    start = sum(energy[name] for name in ("kinetic", "potential", "elastic", "dissipated")) - energy["tool_work"]
     rows = [
         ("grains", f"{summary['grains']:,} ({summary['retired_grains']} left the domain)"),
         ("steps", f"{summary['steps']:,} of {summary['time_step_s'] * 1e6:.3g} us"),
@@ -35,8 +36,8 @@ def summary_text(summary: dict) -> str:
         ("momentum residual", f"{summary['largest_momentum_residual']:.1e} of all forces"),
         (
             "energy balance",
-            f"work of tools {energy['tool_work']:.4g} J = kinetic {energy['kinetic']:.3g} + potential {energy['potential']:.3g}"
-            f" + elastic {energy['elastic']:.3g} + dissipated {energy['dissipated']:.4g}",
+            f"at the start {start:.3g} + work of tools {energy['tool_work']:.4g} J = kinetic {energy['kinetic']:.3g}"
+            f" + potential {energy['potential']:.3g} + elastic {energy['elastic']:.3g} + dissipated {energy['dissipated']:.4g}",
         ),
     ]
     for name, tool in summary["tools"].items():
