@@ -67,10 +67,13 @@ _NEAREST = """
             const float a = distance_to_aabb_sq(p, vec3(al.x, al.y, al.z), vec3(ah.x, ah.y, ah.z));
             const float b = distance_to_aabb_sq(p, vec3(bl.x, bl.y, bl.z), vec3(bh.x, bh.y, bh.z));
             const bool first = a < b;
+            const float near = first ? a : b, far = first ? b : a;
             stack[count] = first ? high.i : low.i;
-            reached[count++] = first ? b : a;
+            reached[count] = far;
+            count += far <= least * 1.000001;
             stack[count] = first ? low.i : high.i;
-            reached[count++] = first ? a : b;
+            reached[count] = near;
+            count += near <= least * 1.000001;
         }
     }
     return best;
