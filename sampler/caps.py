@@ -95,8 +95,6 @@ def boundary_loops(faces: np.ndarray, component: np.ndarray):
 
 def span_loop(vertices: np.ndarray, loop: np.ndarray) -> np.ndarray:
     """Triangles of least total area over a loop of vertices, shape (n - 2, 3) (dynamic programming, Barequet & Sharir 1995)."""
-    if len(loop) == 3:  # most are
-        return np.array(loop, np.int64)[None]
     loop, cut = _without_flat_corners(vertices, list(loop))
     corner, number = vertices[loop], len(loop)
     cost = np.zeros((number, number))

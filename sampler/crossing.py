@@ -159,8 +159,7 @@ def count_layers(points: np.ndarray, normals: np.ndarray, around: Surface, near:
         Shape (n,) int.
     """
     layers = wp.empty(len(points), dtype=int, device=around.device)
-    up = wp.array(normals.astype(np.float32), dtype=wp.vec3, device=around.device)
-    inputs = [around.mesh.id, around.shift(points), up, near / around.unit]
+    inputs = [around.mesh.id, around.shift(points), around.vectors(normals), near / around.unit]
     launch_shares(find_layers, len(points), inputs, [layers], around.device)
     return layers.numpy()
 

@@ -7,6 +7,7 @@ import warp as wp
 
 from sampler.cells import add_lists, cell_numbers, cells_around, empty_cells, sort_into_cells
 from sampler.climbing import climb
+from sampler.closest import lengths
 from sampler.gap_kernels import Nearest, find_gaps, find_neighbours
 from sampler.launching import launch_shares
 from sampler.skin import Skin
@@ -100,7 +101,7 @@ class Gaps:
         points, normals = self.skin.shifted(points), normals.astype(np.float32)
         before = slice(len(self.points))
         moved = np.ones(len(points), bool)
-        moved[before] = np.linalg.norm(points[before] - self.points, axis=1) > _MOVED * self._unit
+        moved[before] = lengths(points[before] - self.points) > _MOVED * self._unit
         moved[before] |= np.einsum("ij,ij->i", normals[before], self.normals) < _TURNED
         changed = np.concatenate([points[moved], self.points[moved[before]]])
         self.points, self.normals = (
@@ -223,5 +224,4 @@ def _excess(free: np.ndarray, own: np.ndarray, gap: tuple[float, float] = _GAP) 
 
 def within(points: np.ndarray, place: np.ndarray, reach: float) -> np.ndarray:
     """Whether points, shape (n, 3), are within reach of a place; shape (n,)."""
-    away = points - place
-    return np.einsum("ij,ij->i", away, away) <= reach * reach  # several times as fast as NumPy's norm
+    return lengths(points - place) <= reach

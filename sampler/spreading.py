@@ -158,7 +158,8 @@ def _throw(skin: Skin, number: int, spacing: float, random: np.random.Generator)
     points, normals = points[order], normals[order]
     where = skin.shifted(points)
     cells = empty_cells(where, spacing / skin.unit)
-    places, up = (wp.array(x.astype(np.float32), dtype=wp.vec3, device="cpu") for x in (where, normals))  # one after another
+    # One after another, so on the CPU wherever the rest runs.
+    places, up = (wp.array(x.astype(np.float32), dtype=wp.vec3, device="cpu") for x in (where, normals))
     last, before, kept = (wp.empty(n, dtype=int, device="cpu") for n in (math.prod(cells.size), len(points), len(points)))
     low, high, best = 0.2, 1.0, np.ones(len(points), bool)
     for _ in range(_HALVINGS):

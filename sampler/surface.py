@@ -224,7 +224,7 @@ class Surface:
         limit = np.broadcast_to(np.asarray(limit, float) / self.unit, len(points)).astype(np.float32)
         face = wp.empty(len(points), dtype=int, device=self.device)
         limit = wp.array(limit, dtype=float, device=self.device)
-        up = wp.array(np.zeros_like(points) if up is None else up, dtype=wp.vec3, device=self.device)
+        up = self.vectors(np.zeros_like(points) if up is None else up)
         self._launch(find_closest, [self.shift(points), limit, up], [face])
         face = face.numpy()
         nearest = points.copy()
@@ -240,7 +240,7 @@ class Surface:
         cone, closed = self._closing
         number, sign = np.zeros(len(points), np.float32), 1.0
         if closed is not None:
-            number += count_windings(closed.mesh, closed.half, closed.shift(points).numpy(), self.device)
+            number += count_windings(closed.mesh, closed.half, closed.shifted(points), self.device)
             if cone is None:
                 return number
             sign = -1.0
@@ -253,7 +253,7 @@ class Surface:
 
     def leavings(self, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
         """By how much the winding number falls on ways between points, shape (n, 3) [m], through the surface; shape (n,) int."""
-        return leavings_between(self.mesh, self.shift(begin).numpy(), self.shift(end).numpy(), self.device)
+        return leavings_between(self.mesh, self.shifted(begin), self.shifted(end), self.device)
 
     @cached_property
     def _closing(self) -> tuple["Surface | None", "Surface | None"]:
@@ -274,8 +274,7 @@ class Surface:
         """First triangles met by rays of unit direction, shape (n,), -1 for none, and the ways to them, shape (n,) [m]."""
         face = wp.empty(len(points), dtype=int, device=self.device)
         length = wp.empty(len(points), dtype=float, device=self.device)
-        direction = wp.array(np.asarray(direction, np.float32), dtype=wp.vec3, device=self.device)
-        self._launch(cast_ray, [self.shift(points), direction], [face, length])
+        self._launch(cast_ray, [self.shift(points), self.vectors(direction)], [face, length])
         return face.numpy(), length.numpy() * self.unit
 
     def _launch(self, kernel, inputs: list, outputs: list) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 from shapes import SOLIDS, THIN, robot_mesh, wavy_ball, wedge
-from spread import distances, neighbours
+from spread import distances, neighbours, worst_place
 
 from benchmarks.sampler_damage import solid_angle_inside
 from sampler import MeshError, SignedDistance, make_field, read_mesh, repair_mesh, sample_body
@@ -14,15 +14,6 @@ from sampler.mass import integrate
 def surface_samples(mesh, number=20000):
     points, face = trimesh.sample.sample_surface(mesh, number, seed=7)
     return points, mesh.face_normals[face]
-
-
-def worst_place(mesh, points, number):
-    """How far from all points the surface lies at most; where random places are far, more are taken."""
-    places, face = trimesh.sample.sample_surface(mesh, number, seed=7)
-    far = distances(places, points)
-    worst = np.isin(np.arange(len(mesh.faces)), face[far > 0.9 * far.max()])
-    places, _ = trimesh.sample.sample_surface(mesh, 2 * number, face_weight=worst * mesh.area_faces, seed=8)
-    return max(far.max(), distances(places, points).max())
 
 
 def skin_gap(mesh, body):

@@ -1,6 +1,7 @@
 """How particles lie, in NumPy alone."""
 
 import numpy as np
+import trimesh
 
 
 def distances(places, points):
@@ -33,3 +34,12 @@ def worst_on_a_box(extents, points, cells=80):
                 place = np.clip(place, -0.5, 0.5)
             worst = max(worst, found.max())
     return worst
+
+
+def worst_place(mesh, points, number):
+    """How far from all points the surface lies at most; where random places are far, more are taken."""
+    places, face = trimesh.sample.sample_surface(mesh, number, seed=7)
+    far = distances(places, points)
+    worst = np.isin(np.arange(len(mesh.faces)), face[far > 0.9 * far.max()])
+    places, _ = trimesh.sample.sample_surface(mesh, 2 * number, face_weight=worst * mesh.area_faces, seed=8)
+    return max(far.max(), distances(places, points).max())
