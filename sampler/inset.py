@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sampler.contour import contour_triangles
+from sampler.rows import ROW, narrow_ribbons
 from sampler.skin import halve_triangles, longest_edges
 from sampler.surface import Surface
 
@@ -18,8 +19,9 @@ _FULL = 0.99  # share of a depth at which it counts as reached
 _ONE_LAYER = 0.05  # skins of a wall nearer than this to each other become one, in spacings
 _ASIDE = 0.02  # of the way to its middle: how far from its corners a piece is asked, so that no other face is there
 _FALLEN = 0.3  # share of their area that pieces of walls keep at least
-_ROW, _LINE = 0.87, 0.02  # rods thinner than particles count as so wide, and get this radius; in spacings
-_OWN = 0.3  # pieces nearer than this to the surface found so far belong to it, in spacings
+_LINE = 0.02  # radius of the lines that what is neither wall nor rod becomes, in spacings
+_THREAD = 0.3  # what lies one radius deep nearer to the middle of a rod than this is left out for it, in spacings
+_OWN = 0.45  # pieces nearer than this to the surface found so far belong to it, in spacings
 
 
 @dataclass(frozen=True)
@@ -97,10 +99,10 @@ class Inside:
         return np.where(near[:, None], place, points)
 
 
-def inset_triangles(inside: Inside, radius: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+def inset_triangles(inside: Inside, radius: float, spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The surface one radius below the skin: where walls are thinner, the middle between their skins, in one layer.
 
-    Rods become lines: slender ones that count as wide as a row of particles.
+    Rods and narrow strips become lines: slender ones that count as wide as a row of particles.
 
     Args:
         inside: of the solid; its skin must consist of what particles are to cover.
@@ -108,7 +110,8 @@ def inset_triangles(inside: Inside, radius: float, spacing: float) -> tuple[np.n
         spacing: of the particles to come [m].
 
     Returns:
-        Triangles, shape (n, 3, 3) [m], and the layers that each counts as, see ``Skin``, shape (n,).
+        Triangles, shape (n, 3, 3) [m]; the layers that each counts as, see ``Skin``, shape (n,); which are the middle of walls,
+        shape (n,).
     """
     cell = _CELL * spacing
     deep = radius + cell  # thinner walls may slip through between the cells
@@ -118,34 +121,47 @@ def inset_triangles(inside: Inside, radius: float, spacing: float) -> tuple[np.n
     pieces = _pieces(triangles, _PIECE * max(spacing, radius))
     middle, normals = pieces.mean(axis=1), Surface.normals_of(pieces)
     ball, other = inside.balls(middle, normals, deep)
-    wall = (ball < _FULL * deep) & (np.einsum("ij,ij->i", normals, other) < _OPPOSED)
-    aim = np.random.default_rng(0).standard_normal(3)
+    toward = np.random.default_rng(0).standard_normal(3)
+    toward /= np.linalg.norm(toward)
+    thin = ball < _FULL * deep
+    which, ribbons, share = narrow_ribbons(inside.skin, pieces[thin], 2.0 * deep, spacing, toward)
+    thin[np.flatnonzero(thin)[which]] = False
+    wall = thin & (np.einsum("ij,ij->i", normals, other) < _OPPOSED)
+    sheets, single = np.zeros((0, 3, 3)), np.zeros(0, bool)
     if wall.any():
         found = found[~_in_walls(inside, found, deep)]
         # Where the skins meet in the middle, only those pieces are taken that look one way more than the others.
-        taken = wall & ((ball > radius + 0.5 * _ONE_LAYER * spacing) | ((normals - other) @ aim > 0.0))
-        sheets, taken = _images(inside, pieces[taken], normals[taken], radius), np.flatnonzero(taken)
-        narrow = Surface.areas_of(sheets) < _FALLEN * Surface.areas_of(pieces[taken])  # at rims, and in rods
-        wall[taken[narrow]] = False
-        found = np.concatenate([found, sheets[~narrow]])
-    layers = np.ones(len(found))
-    rest = np.flatnonzero((ball < _FULL * deep) & ~wall & (normals @ aim > 0.0))
+        taken = np.flatnonzero(wall & ((ball > radius + 0.5 * _ONE_LAYER * spacing) | ((normals - other) @ toward > 0.0)))
+        sheets = _images(inside, pieces[taken], normals[taken], radius)
+        broad = Surface.areas_of(sheets) > _FALLEN * Surface.areas_of(pieces[taken])  # not so at rims
+        wall[taken[~broad]] = False
+        sheets, single = sheets[broad], ball[taken[broad]] < radius
+    if len(ribbons):
+        found = found[_farther(found.mean(axis=1), ribbons, _THREAD * spacing)]
+    layers = np.concatenate([np.ones(len(found) + len(sheets)), share])
+    single = np.concatenate([np.zeros(len(found), bool), single, np.zeros(len(ribbons), bool)])
+    found = np.concatenate([found, sheets, ribbons])
+    rest = np.flatnonzero(thin & ~wall & (normals @ toward > 0.0))
     place, depth = inside.sink(middle[rest] - ball[rest, None] * normals[rest], deep)
     rest, place, depth = (values[depth < _FULL * deep] for values in (rest, place, depth))
-    if len(rest) and len(found):
-        away = np.linalg.norm(Surface(found).closest(place)[0] - place, axis=1)
-        rest = rest[away > np.maximum(0.0, depth - radius) + _OWN * spacing]
+    rest = rest[_farther(place, found, np.maximum(0.0, depth - radius) + _OWN * spacing)]
     if len(rest):
-        rods = _images(inside, pieces[rest], normals[rest], radius)
-        way = pieces[rest] - rods
-        length = np.linalg.norm(way, axis=(1, 2), keepdims=True) / np.sqrt(3.0)
-        length = np.maximum(length, np.finfo(float).tiny)
-        rods += way * np.minimum(0.5, _LINE * spacing / length)
-        row = Surface.areas_of(pieces[rest]) * _ROW * spacing / (np.pi * length[:, 0, 0])  # half of a rod looks one way
-        found = np.concatenate([found, rods])
-        layers = np.append(layers, Surface.areas_of(rods) / row)
+        lines = _images(inside, pieces[rest], normals[rest], radius)
+        way = pieces[rest] - lines
+        length = np.maximum(np.linalg.norm(way, axis=(1, 2)) / np.sqrt(3.0), np.finfo(float).tiny)
+        lines += way * np.minimum(0.5, _LINE * spacing / length)[:, None, None]
+        row = Surface.areas_of(pieces[rest]) * ROW * spacing / (np.pi * length)  # half of a rod looks one way
+        found, layers = np.concatenate([found, lines]), np.append(layers, Surface.areas_of(lines) / row)
+        single = np.append(single, np.zeros(len(rest), bool))
     sound = Surface.areas_of(found) > 0.0
-    return found[sound], layers[sound]
+    return found[sound], layers[sound], single[sound]
+
+
+def _farther(points: np.ndarray, triangles: np.ndarray, least: np.ndarray | float) -> np.ndarray:
+    """Whether points, shape (n, 3) [m], lie farther from triangles than so far [m]; shape (n,)."""
+    if len(points) == 0 or len(triangles) == 0:
+        return np.ones(len(points), bool)
+    return np.linalg.norm(Surface(triangles).closest(points)[0] - points, axis=1) > least
 
 
 def _pieces(triangles: np.ndarray, longest: float) -> np.ndarray:
@@ -176,4 +192,6 @@ def _images(inside: Inside, pieces: np.ndarray, normals: np.ndarray, radius: flo
     place = corners - ball[:, None] * up
     stuck = np.flatnonzero((ball < _FULL * radius) & (np.einsum("ij,ij->i", up, other) > _OPPOSED))  # at another face
     place[stuck] = inside.sink(place[stuck], radius)[0]
-    return place.reshape(-1, 3, 3)
+    place = place.reshape(-1, 3, 3)
+    middle = place.mean(axis=1, keepdims=True)
+    return middle + (place - middle) / (1.0 - _ASIDE)

@@ -15,7 +15,8 @@ from sampler.mass import count_inside, integrate, is_physical, joined, openness
 from sampler.measuring import measure_evenness
 from sampler.options import check_options
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
-from sampler.sheets import beyond_rims, closed_triangles, thick_plates
+from sampler.rims import beyond_edges, beyond_layers
+from sampler.sheets import closed_triangles, thick_plates
 from sampler.skin import Skin, coinciding_layers, free_triangles, touchable_parts, winding_before
 from sampler.spreading import Observer, spread_particles
 from sampler.surface import Surface
@@ -93,14 +94,15 @@ def sample_body(
     fine = _spacing(radius, spacing, count, grain, free)
     outer = skin = _skin(free, solid, fine, device)
     settle = partial(_clear_creases, skin=skin, solid=solid) if solid else None
-    inside = None
+    inside, thin = None, np.zeros((0, 3, 3))
     if inset and solid:
         inside = Inside(_skin(free[: len(free) - len(plates)], solid, fine, device), solid)
         plates = touchable_parts(plates, solid, fine) if len(plates) else plates
-        skin, settle = _inset_skin(inside, plates, radius, fine, count), None
+        skin, thin = _inset_skin(inside, plates, radius, fine, count)
+        settle = None
 
     def spread(number: int, h: float) -> tuple[np.ndarray, np.ndarray]:
-        beyond = beyond_rims(repaired.vertices, sheet, outer, h)
+        beyond = np.concatenate([beyond_edges(repaired.vertices, sheet, outer, h), beyond_layers(thin, skin, h)])
         move = partial(settle, spacing=h) if settle else lambda *placed: placed
         points, normals = spread_particles(skin, number, seed, progress, observe, move, beyond)
         return (inside.settle(points, radius, 0.2 * h) if inside else points), normals
@@ -171,10 +173,13 @@ def _skin(free: np.ndarray, solid: Surface | None, spacing: float, device: str) 
     return Skin(parts, device, coinciding_layers(parts, solid) if solid else None)
 
 
-def _inset_skin(inside: Inside, plates: np.ndarray, radius: float, spacing: float, count: int | None) -> Skin:
-    """The surface one radius below the skin, and plates as they are; as fine as the count asks for there, if one is given."""
+def _inset_skin(inside: Inside, plates: np.ndarray, radius: float, spacing: float, count: int | None) -> tuple[Skin, np.ndarray]:
+    """The surface one radius below the skin, and plates as they are; as fine as the count asks for there, if one is given.
+
+    And those triangles of it, shape (n, 3, 3) [m], that are the only layer in walls.
+    """
     for _ in range(_TRIES):
-        triangles, layers = inset_triangles(inside, radius, spacing)
+        triangles, layers, thin = inset_triangles(inside, radius, spacing)
         if len(triangles) + len(plates) == 0:
             raise MeshError(f"mesh: particles of radius {radius:.3g} m find no room in it; take smaller ones, or no inset")
         skin = Skin(np.concatenate([triangles, plates]), inside.skin.device, np.append(layers, np.ones(len(plates))))
@@ -182,7 +187,7 @@ def _inset_skin(inside: Inside, plates: np.ndarray, radius: float, spacing: floa
         if finer > 0.8 * spacing:
             break
         spacing = finer
-    return skin
+    return skin, triangles[thin]
 
 
 def _clear_creases(

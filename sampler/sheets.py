@@ -7,8 +7,6 @@ from sampler.repair import SHEET, RepairedMesh
 from sampler.surface import Surface
 from sampler.topology import edges_of, halves_around, link_items
 
-_OUT, _PER_SPACING = 0.5, 3.0  # beyond rims, in spacings: over half a lattice row, which covers them; so many per spacing
-
 
 def closed_triangles(repaired: RepairedMesh, thickness: float) -> tuple[np.ndarray, np.ndarray]:
     """Solids, caps and sheets of a thickness [m]; sheets without any get a front and a back in one place.
@@ -76,29 +74,6 @@ def thicken(vertices: np.ndarray, faces: np.ndarray, thickness: float) -> tuple[
     faces = np.concatenate([front, back[:, ::-1], *strip])
     ends = close_holes(place, faces, np.zeros(len(faces), np.int64))  # where several rims meet
     return place + 0.5 * thickness * offset, np.concatenate([faces, ends.faces])
-
-
-def beyond_rims(vertices: np.ndarray, faces: np.ndarray, around: Surface, spacing: float) -> np.ndarray:
-    """Places beyond rims of sheets, where no other surface goes on, shape (n, 3) [m].
-
-    Args:
-        vertices: shape (k, 3) [m].
-        faces: of the sheets, shape (m, 3).
-        around: all that particles are to cover.
-        spacing: of the particles [m].
-    """
-    edges = edges_of(faces)
-    rim = edges.half[edges.of(1)[:, 0]]
-    face, corner = np.divmod(rim, 3)
-    tail, head = vertices[faces[face, corner]], vertices[faces[face, (corner + 1) % 3]]
-    outward = np.cross(head - tail, Surface.normals_of(vertices[faces[face]]))
-    length = np.linalg.norm(outward, axis=1)
-    way = np.cumsum(length)
-    at = np.arange(0.0, way[-1] if len(way) else 0.0, spacing / _PER_SPACING)
-    k = np.searchsorted(way, at, side="right")
-    share = ((at - way[k] + length[k]) / length[k])[:, None]
-    places = tail[k] + share * (head - tail)[k] + (_OUT * spacing / length[k])[:, None] * outward[k]
-    return places[np.linalg.norm(around.closest(places)[0] - places, axis=1) > 0.9 * _OUT * spacing]
 
 
 def _continued_sides(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from sampler.rays import closing_cones, count_windings, leavings_between
 ASIDE = wp.constant(1.0e-5)  # of the diagonal: how much nearer the wrong side of a wall must be to be taken
 _APART = 2.0, 1.2  # times their spread, from where on triangles are summed: within 0.002, and within 0.07 in a third of the time
 _SURE = 0.25  # how near to a whole number such a rough winding number is good enough
+_FARTHEST = 4.0  # of the diagonal: as far as rays go
 _RAGGED = 0.5  # open edges per triangle from which solid angles are as fast
 
 
@@ -122,13 +123,14 @@ def cast_ray(
     mesh: wp.uint64,
     points: wp.array(dtype=wp.vec3),
     direction: wp.array(dtype=wp.vec3),
+    limit: float,
     first: int,
     face: wp.array(dtype=int),
     length: wp.array(dtype=float),
 ):
-    """First triangle met by each ray and the way to it; -1 for none."""
+    """First triangle met by each ray within a limit and the way to it; -1 for none."""
     i = first + wp.tid()
-    hit = wp.mesh_query_ray(mesh, points[i], direction[i], 4.0)
+    hit = wp.mesh_query_ray(mesh, points[i], direction[i], limit)
     face[i] = wp.where(hit.result, hit.face, -1)
     length[i] = hit.t
 
@@ -270,11 +272,15 @@ class Surface:
         launch_shares(find_winding, len(points), [self._weighed.id, self.shift(points), apart], [number], self.device)
         return number.numpy()
 
-    def cast(self, points: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """First triangles met by rays of unit direction, shape (n,), -1 for none, and the ways to them, shape (n,) [m]."""
+    def cast(self, points: np.ndarray, direction: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
+        """First triangles met by rays of unit direction, shape (n,), -1 for none, and the ways to them, shape (n,) [m].
+
+        At most ``limit`` [m] away; the shorter that is, the faster.
+        """
         face = wp.empty(len(points), dtype=int, device=self.device)
         length = wp.empty(len(points), dtype=float, device=self.device)
-        self._launch(cast_ray, [self.shift(points), self.vectors(direction)], [face, length])
+        limit = min(limit / self.unit, _FARTHEST)
+        self._launch(cast_ray, [self.shift(points), self.vectors(direction), limit], [face, length])
         return face.numpy(), length.numpy() * self.unit
 
     def _launch(self, kernel, inputs: list, outputs: list) -> None:

@@ -61,15 +61,48 @@ def test_walls_thinner_than_a_particle_get_one_layer_in_their_middle(wall):
 
 
 def test_rods_thinner_than_a_particle_get_one_row_in_their_middle():
-    """And one seed in twelve spreads them so evenly; others keep a gap of two spacings (README of the sampler)."""
+    """One seed in two spreads them so evenly, none leaves a gap of two spacings (README of the sampler)."""
 
     def is_even(seed):
         body = sample_body(trimesh.creation.cylinder(0.002, 0.2, sections=24), radius=0.004, inset=True, seed=seed)
         assert np.linalg.norm(body.points[:, :2], axis=1).max() < 0.05 * body.radius
+        assert abs(len(body) - 0.196 / 0.006) <= 1.0  # as long as the rod less what it is thick
         along = np.sort(body.points[:, 2])
+        assert np.diff(along).max() < 2.0 * body.spacing
         return np.diff(along).max() <= 1.25 * body.spacing and max(along[0] + 0.1, 0.1 - along[-1]) <= body.spacing
 
-    assert any(is_even(seed) for seed in range(100))
+    even = [is_even(seed) for seed in range(6)]
+    assert any(even)
+
+
+@pytest.mark.parametrize("millimetres", [(1.5, 1), (4, 1), (8, 1), (9.5, 1), (10, 5), (14, 7.5)])
+def test_strips_narrower_than_a_row_get_one_too(millimetres):
+    width, wall = 1e-3 * np.array(millimetres)
+    body = sample_body(trimesh.creation.box((0.2, width, wall)), radius=0.004, inset=True)
+    inner = np.abs(body.points[np.abs(body.points[:, 0]) < 0.1 - width])  # at ends it is a wall as wide as long
+    assert inner[:, 1].max() < 0.05 * body.spacing
+    assert inner[:, 2].max() < 0.02 * body.radius
+    dense = np.clip((width - wall) / (0.87 * 0.006), 1.0, 1.33)
+    assert abs(len(body) - dense * (0.2 - wall) / 0.006) <= 2.0
+    x, y = np.meshgrid(np.linspace(-0.1 + 0.5 * wall, 0.1 - 0.5 * wall, 400), np.linspace(-0.5, 0.5, 21) * (width - wall))
+    assert distances(np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3), body.points).max() <= body.spacing
+
+
+@pytest.mark.parametrize("width", [0.0105, 0.012, 0.018])
+def test_rims_of_walls_do_not_draw_particles(width):
+    """Without what holds them back most lie on rims, a third as evenly."""
+    body = sample_body(trimesh.creation.box((0.2, width, 0.001)), radius=0.004, inset=True)
+    assert variation(body.points) <= 0.05
+    x, y = np.meshgrid(np.linspace(-0.0995, 0.0995, 400), np.linspace(-0.5, 0.5, 41) * (width - 0.001))
+    assert distances(np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3), body.points).max() <= 1.05 * body.spacing
+
+
+def test_walls_of_tubes_are_no_strips():
+    body = sample_body(trimesh.creation.annulus(0.01, 0.0105, 0.1), radius=0.004, inset=True)
+    area = 2.0 * np.pi * 0.01025 * 0.0995
+    assert abs(len(body) - 2.0 * area / (np.sqrt(3.0) * 0.006**2)) <= 0.05 * len(body)
+    assert variation(body.points) <= 0.065
+    assert body.evenness.skin_coverage <= 1.0
 
 
 @pytest.mark.parametrize("thickness", [None, 0.001])
