@@ -48,6 +48,8 @@ def _run(options: argparse.Namespace) -> int:
             raise MeshError(f"cannot write {written}: there is no folder {written.parent}")
         if written and written.is_dir():
             raise MeshError(f"cannot write {written}: it is a folder; name a file in it")
+        if written and written.exists() and written.samefile(path):
+            raise MeshError(f"cannot write {written}: it is the mesh; name another file")
     recording = None
     if options.rrd:
         from sampler.recording import Recording

@@ -5,37 +5,41 @@ import warp as wp
 
 
 @wp.func
-def closest_on_edge(a: wp.vec3, b: wp.vec3, p: wp.vec3) -> wp.vec3:
-    """Closest point of a line between two ends."""
+def closest_on_edge(a: wp.vec3d, b: wp.vec3d) -> wp.vec3d:
+    """Closest point of a line between two ends to the origin."""
     along = b - a
     square = wp.dot(along, along)
-    if square == 0.0:
+    if square == wp.float64(0.0):
         return a
-    return a + along * wp.clamp(wp.dot(p - a, along) / square, 0.0, 1.0)
+    return a + along * wp.clamp(-wp.dot(a, along) / square, wp.float64(0.0), wp.float64(1.0))
 
 
 @wp.func
-def closest_point(a: wp.vec3, b: wp.vec3, c: wp.vec3, p: wp.vec3) -> wp.vec3:
-    """Closest point of a triangle."""
+def closest_point(x: wp.vec3, y: wp.vec3, z: wp.vec3, p: wp.vec3) -> wp.vec3:
+    """Closest point of a triangle; in single precision it would lie off the plane of long thin ones."""
+    here = wp.vec3d(p)
+    a = wp.vec3d(x) - here
+    b = wp.vec3d(y) - here
+    c = wp.vec3d(z) - here
     n = wp.cross(b - a, c - a)
     area = wp.dot(n, n)
-    inside = area > 0.0
-    if wp.dot(wp.cross(b - a, p - a), n) < 0.0:
+    inside = area > wp.float64(0.0)
+    if wp.dot(wp.cross(a, b - a), n) < wp.float64(0.0):
         inside = False
-    if wp.dot(wp.cross(c - b, p - b), n) < 0.0:
+    if wp.dot(wp.cross(b, c - b), n) < wp.float64(0.0):
         inside = False
-    if wp.dot(wp.cross(a - c, p - c), n) < 0.0:
+    if wp.dot(wp.cross(c, a - c), n) < wp.float64(0.0):
         inside = False
     if inside:
-        return p - n * (wp.dot(p - a, n) / area)
-    best = closest_on_edge(a, b, p)
-    other = closest_on_edge(b, c, p)
-    if wp.length_sq(other - p) < wp.length_sq(best - p):
+        return wp.vec3(here + n * (wp.dot(a, n) / area))
+    best = closest_on_edge(a, b)
+    other = closest_on_edge(b, c)
+    if wp.length_sq(other) < wp.length_sq(best):
         best = other
-    other = closest_on_edge(c, a, p)
-    if wp.length_sq(other - p) < wp.length_sq(best - p):
+    other = closest_on_edge(c, a)
+    if wp.length_sq(other) < wp.length_sq(best):
         best = other
-    return best
+    return wp.vec3(here + best)
 
 
 def closest_on_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from sampler.surface import Surface
 MOST = 2_000_000  # particles, more are not meant
 _BURIED = 10.0  # times as large as what can be touched, at most, is all of a surface that is worth cutting
 _HUGE = 1000.0  # particles of so many diagonals are not meant
+_FINE = 1e-5  # nor are particles so much finer than the diagonal, which single precision would not place within their radius
 _MOST = {"variation": 0.10, "farthest": 1.10, "coverage": 1.0, "skin_coverage": 1.10}  # beyond what hard meshes need
 _LEAST = {"nearest": 0.30}
 _OFF = 0.01  # share by which the number of particles may differ from the wanted one
@@ -24,13 +25,18 @@ def check_scale(triangles: np.ndarray, radius: float, spacing: float) -> None:
         spacing: of the particles [m].
 
     Raises:
-        MeshError: if they would be far too many, or far larger than the mesh.
+        MeshError: if they would be far too many, or far larger or far smaller than the mesh.
     """
     size = float(np.linalg.norm(np.ptp(triangles, axis=(0, 1))))
     if max(radius, spacing) > _HUGE * size:
         raise MeshError(
             f"particles of radius {radius:.3g} m, {spacing:.3g} m apart, are far larger than the mesh, {size:.3g} m across; "
             "check the mesh's scale"
+        )
+    if spacing < _FINE * size:
+        raise MeshError(
+            f"particles {spacing:.3g} m apart are far too fine for a mesh {size:.3g} m across; check the mesh's scale, and "
+            "whether it has stray vertices or parts"
         )
     area = float(Surface.areas_of(triangles).sum())
     with np.errstate(over="ignore"):

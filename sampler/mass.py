@@ -41,7 +41,7 @@ def integrate(triangles: np.ndarray, share: np.ndarray | float = 1.0) -> tuple[f
     """
     origin = triangles.mean(axis=(0, 1))
     a, b, c = np.moveaxis(triangles - origin, 1, 0)
-    volumes = share * np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0  # of tetrahedra with the origin
+    volumes = share * np.einsum("ij,ij->i", a, np.cross(b - a, c - a)) / 6.0  # of tetrahedra with the origin, also of far ones
     volume = float(volumes.sum())
     total = a + b + c
     first = (volumes @ total) / 4.0

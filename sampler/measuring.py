@@ -24,7 +24,7 @@ def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Eve
         gaps.add(*places, fixed=True)
     worst = [_worst_place(gaps, along, most, random) for along in (False, True)]
     nearest = gaps.neighbour_distances(most) if len(points) > 1 else np.full(1, np.inf)
-    variation = nearest.std() / nearest.mean() if len(points) > 1 else 0.0
+    variation = nearest.std() / nearest.mean() if len(points) > 1 and nearest.any() else 0.0
     return Evenness(*map(float, (variation, nearest.min(), nearest.max(), worst[0], max(worst))))
 
 

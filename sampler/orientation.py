@@ -6,6 +6,7 @@ from sampler.surface import Surface
 from sampler.topology import Edges, edges_of, halves_around, link_items
 
 _STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what is there
+_NESTED = 0.9  # share of the area of a cavity's walls that lies inside of the solid; parts that overlap others come out of them
 _VOTERS = 100  # largest faces of a piece, which tell what side of it is the inside
 
 
@@ -111,9 +112,11 @@ def face_outward(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray,
     if inward.any() and not inward.all():
         outer = ~inward[component] & ~sheet
         around = Surface(triangles[outer][:, ::-1] if all_turned else triangles[outer])
-        first = np.array([np.flatnonzero(component == c)[0] for c in np.flatnonzero(inward)])
-        nested = around.winding(triangles[first].mean(axis=1)) > 0.5
-        inward[np.flatnonzero(inward)[nested]] = False
+        asked = np.flatnonzero(inward[component])
+        within = around.winding(triangles[asked].mean(axis=1), rough=True) > 0.5
+        area = Surface.areas_of(triangles[asked])
+        whole, inner = (np.bincount(component[asked], weight, len(inward)) for weight in (area, area * within))
+        inward &= inner <= _NESTED * whole
     turned = inward ^ all_turned
     turned &= volume != 0.0
     return np.where(turned[component][:, None], faces[:, ::-1], faces), int(turned.sum())

@@ -25,6 +25,7 @@ logging.getLogger("trimesh").addHandler(logging.NullHandler())
 _POINTER = b"version https://git-lfs"
 _OWN = {"stl": read_stl, "ply": read_ply, "off": read_off, "3mf": read_3mf}
 _LETTERS = bytes(range(128)) + 128 * b"?"
+_LARGEST = 1e100  # [m], of which squares and cubes are numbers yet
 _WITH_UNIT = ("dae", "zae")  # files whose unit trimesh tells
 
 
@@ -65,8 +66,10 @@ def check_mesh(mesh: trimesh.Trimesh, name: str = "mesh") -> trimesh.Trimesh:
     """Refuse triangles that cannot be worked with.
 
     Raises:
-        MeshError: if there are none, they refer to missing vertices, are not finite or have no area.
+        MeshError: if it is none, there are none, they refer to missing vertices, are not finite or have no area.
     """
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise MeshError(f"mesh {name}: must be a trimesh.Trimesh, got {type(mesh).__name__}; sampler.read_mesh reads files")
     vertices, faces = np.asarray(mesh.vertices, float), np.asarray(mesh.faces)
     if not len(faces):
         raise MeshError(f"mesh {name}: has no triangles")
@@ -75,6 +78,8 @@ def check_mesh(mesh: trimesh.Trimesh, name: str = "mesh") -> trimesh.Trimesh:
     check_corners(name, faces, len(vertices))
     if not np.all(np.isfinite(vertices[faces])):
         raise MeshError(f"mesh {name}: has vertices that are not finite; export it again")
+    if np.abs(vertices[faces]).max() > _LARGEST:
+        raise MeshError(f"mesh {name}: has vertices farther than {_LARGEST:g} m away; export it again")
     if mesh.area <= 1e-14 * float(np.ptp(vertices[faces].reshape(-1, 3), axis=0).max()) ** 2:
         raise MeshError(f"mesh {name}: its triangles have no area")
     return mesh

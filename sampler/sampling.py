@@ -73,6 +73,9 @@ def sample_body(
     check_options(lengths, count, seed, device)
     repaired = mesh if isinstance(mesh, RepairedMesh) else repair_mesh(mesh, sheets)
     thickness = 2.0 * radius if thickness is None else thickness
+    if thickness > max(2.0 * radius, repaired.diagonal) and np.any(repaired.kind == SHEET):
+        size = repaired.diagonal
+        raise MeshError(f"sheets {thickness:.3g} m thick cannot be meant in a mesh {size:.3g} m across; check the units")
     check_scale(repaired.triangles, radius, _spacing(radius, spacing, count, grain, repaired.triangles))
     closed, owner = closed_triangles(repaired, thickness)
     fine = _spacing(radius, spacing, count, grain, closed)
@@ -84,7 +87,7 @@ def sample_body(
         solid = Surface(closed[owner != SHEET], device)
         plates = free_triangles(repaired.vertices[sheet], solid, fine)[0]
     free, parent, layers = free_triangles(solid.triangles, solid, fine)
-    volume, centre, inertia, doubts = _mass(solid, free, parent, layers, thick_plates(plates, thickness), repaired.closed)
+    volume, centre, inertia, doubts = _mass(solid, around, free, parent, layers, thick_plates(plates, thickness), repaired.closed)
     if solid is not around:
         free = np.concatenate([free, plates])
     elif len(sheet):
@@ -170,6 +173,8 @@ def _spread_tight(
 
 def _skin(free: np.ndarray, solid: Surface | None, spacing: float, device: str) -> Skin:
     parts = touchable_parts(free, solid, spacing)
+    if not len(parts):
+        raise MeshError("mesh: its surface is far narrower than long everywhere, so it has no normals; check for stray vertices")
     return Skin(parts, device, coinciding_layers(parts, solid) if solid else None)
 
 
@@ -233,7 +238,7 @@ def _spacing(radius, spacing, count, grain, triangles) -> float:
     return fine if grain is None else min(fine, _CLOSED * (radius + grain) / _COVERED)
 
 
-def _mass(solid, free, parent, layers, plates, closed) -> tuple[float, np.ndarray, np.ndarray, list[str]]:
+def _mass(solid, around, free, parent, layers, plates, closed) -> tuple[float, np.ndarray, np.ndarray, list[str]]:
     """From all triangles of the solid where all are free, apart and outward, else from its free parts; and from plates.
 
     Returns:
@@ -255,5 +260,10 @@ def _mass(solid, free, parent, layers, plates, closed) -> tuple[float, np.ndarra
     low, high = corners.min(axis=0), corners.max(axis=0)
     if is_physical(volume, centre, inertia, low, high):
         return volume, centre, inertia, warnings
+    if len(plates):  # those that lie on the solid or one another count twice
+        volume, centre, inertia = count_inside(around)
+        if is_physical(volume, centre, inertia, low, high):
+            warnings.append("sheets overlap solids, so volume and inertia are counted from places inside of them")
+            return volume, centre, inertia, warnings
     warnings.append("the surface encloses no sound volume; mass and inertia must be given by hand")
     return float("nan"), solid.triangles.mean(axis=(0, 1)), np.full((3, 3), np.nan), warnings

@@ -144,8 +144,11 @@ def touchable_parts(triangles: np.ndarray, solid: Surface | None, spacing: float
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     narrow = _NARROW * np.linalg.norm(high - low) * longest_edges(triangles)
     triangles = triangles[2.0 * Surface.areas_of(triangles) > narrow]
-    if solid is not None:
-        triangles = _outside_slits(np.delete(triangles, _folds(triangles, solid), axis=0), solid, spacing)
+    if solid is not None and len(triangles):
+        triangles = np.delete(triangles, _folds(triangles, solid), axis=0)
+        triangles = _outside_slits(triangles, solid, spacing) if len(triangles) else triangles
+    if not len(triangles):
+        return triangles
     island = _islands(triangles, 0.25 * spacing)
     speck = np.bincount(island, Surface.areas_of(triangles))[island] < _SPECK * spacing**2
     speck &= longest_edges(triangles) < 0.25 * spacing

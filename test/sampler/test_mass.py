@@ -69,6 +69,23 @@ def test_surfaces_that_close_are_told_from_others():
     assert openness(np.asarray(mesh.triangles)[: len(mesh.faces) // 2]) > 0.1
 
 
+@pytest.mark.parametrize("apart", [1e3, 1e4])
+def test_parts_far_apart_weigh_no_less_exactly(apart):
+    ball, far = trimesh.creation.icosphere(3), trimesh.creation.icosphere(2)
+    parts = [integrate(np.asarray(mesh.triangles))[0] for mesh in (ball, far)]
+    far.apply_translation((apart, 0.3 * apart, 0.1 * apart))
+    volume, centre, _ = integrate(np.asarray(trimesh.util.concatenate([ball, far]).triangles))
+    assert volume == pytest.approx(sum(parts), rel=1e-10)
+    assert centre == pytest.approx(np.array([1.0, 0.3, 0.1]) * apart * parts[1] / sum(parts), rel=1e-10)
+
+
+def test_a_sheet_that_lies_on_a_solid_leaves_it_a_mass():
+    sheet = trimesh.Trimesh([[-0.4, -0.4, 0.5], [0.4, -0.4, 0.5], [0.4, 0.4, 0.5], [-0.4, 0.4, 0.5]], [[0, 1, 2], [0, 2, 3]])
+    body = sample_body(trimesh.util.concatenate([trimesh.creation.box((1.0, 1.0, 1.0)), sheet]), 0.03, count=800)
+    assert body.volume == pytest.approx(1.0 + 0.03 * 0.8**2, rel=1e-3)
+    assert any("sheets overlap solids" in warning for warning in body.mass_warnings)
+
+
 @pytest.mark.parametrize("gap", [0.03, 0.06])
 def test_cracked_solids_weigh_what_lies_inside_of_them(gap):
     """The integral over patches that do not meet lacks twice the share of their gaps: 6 or 12 %."""

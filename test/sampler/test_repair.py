@@ -148,6 +148,17 @@ def test_inside_out_solids_are_turned_but_cavities_stay():
         assert SignedDistance(mesh).query([[0, 0, 0], [0, 0, 0.75], [0, 0, 1.5]])[0] == pytest.approx([0.5, -0.25, 0.5], abs=0.01)
 
 
+@pytest.mark.parametrize("first", [0, 5, 9])
+def test_an_inverted_part_that_overlaps_is_no_cavity_whichever_face_comes_first(first):
+    box, other = trimesh.creation.box((1.0, 1.0, 1.0)), trimesh.creation.box((1.0, 1.0, 1.0))
+    other.apply_translation((0.5, 0.3, 0.2))
+    other = trimesh.Trimesh(other.vertices, np.roll(other.faces[:, ::-1], first, axis=0), process=False)
+    repaired = repair_mesh(trimesh.util.concatenate([box, other]))
+    assert repaired.report.steps["components turned"] == 1
+    union = 2.0 - 0.5 * 0.7 * 0.8
+    assert sample_body(repaired, 0.05, count=300).volume == pytest.approx(union, rel=1e-9)
+
+
 def test_a_wall_between_touching_solids_is_no_surface():
     left = trimesh.creation.box((1, 1, 1))
     right = trimesh.Trimesh(left.vertices * [-1, 1, 1] + [1, 0, 0], left.faces[:, ::-1])

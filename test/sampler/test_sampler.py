@@ -9,6 +9,7 @@ import trimesh
 from spread import distances, neighbours
 
 from sampler import MeshError, SignedDistance, locate_mesh, read_mesh, sample_body
+from sampler.surface import Surface
 
 MESHES = Path(__file__).parents[2] / "config" / "meshes"
 BUCKET = MESHES / "bucket.stl"
@@ -181,6 +182,44 @@ def test_radii_that_make_no_sense_are_refused(sphere, radius, reason):
 def test_scales_that_make_no_sense_are_told_before_numbers_overflow(radius):
     with pytest.raises(MeshError, match="check the mesh's scale"):
         sample_body(trimesh.creation.box((1.0, 1.0, 1.0)), radius=radius)
+
+
+def test_a_stray_vertex_leaves_particles_on_the_surface():
+    ball = trimesh.creation.icosphere(3)
+    ball.vertices[5] = 1e3
+    body = sample_body(ball, 0.1, count=500)
+    away = np.linalg.norm(Surface(np.asarray(ball.triangles)).closest(body.points)[0] - body.points, axis=1)
+    assert away.max() < 1e-3 * body.radius
+
+
+@pytest.mark.parametrize(
+    ("far", "radius", "reason"), [(1e6, 0.1, "stray vertices"), (1e160, 0.1, "farther than"), (1e6, 1e3, "no normals")]
+)
+def test_what_is_far_too_large_for_its_particles_is_refused(far, radius, reason):
+    ball = trimesh.creation.icosphere(3)
+    ball.vertices[5] = far
+    with pytest.raises(MeshError, match=reason):
+        sample_body(ball, radius)
+
+
+def test_parts_far_apart_are_refused():
+    ball, other = trimesh.creation.icosphere(3), trimesh.creation.icosphere(3)
+    other.apply_translation((1e5, 0.0, 0.0))
+    with pytest.raises(MeshError, match="far too fine for a mesh"):
+        sample_body(trimesh.util.concatenate([ball, other]), 0.1)
+
+
+def test_sheets_thicker_than_the_mesh_are_refused():
+    box = trimesh.creation.box((1.0, 1.0, 1.0))
+    box.update_faces(box.face_normals[:, 2] < 0.5)
+    with pytest.raises(MeshError, match=r"sheets 1e\+03 m thick cannot be meant"):
+        sample_body(box, 0.1, thickness=1000.0)
+
+
+@pytest.mark.parametrize("mesh", [None, "box.stl", trimesh.Scene()])
+def test_what_is_no_mesh_is_refused(mesh):
+    with pytest.raises(MeshError, match=r"must be a trimesh\.Trimesh, got"):
+        sample_body(mesh, 0.1)
 
 
 def test_millimetres_taken_for_metres_are_told():
