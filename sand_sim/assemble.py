@@ -18,7 +18,7 @@ from sand_sim.grain_table import GrainTable
 from sand_sim.playing import check_trajectory
 from sand_sim.precision import PRECISIONS, Precision
 from sand_sim.scene.checking import check_scene
-from sand_sim.scene.filling import fill_grains, smallest_of_materials, smallest_sphere
+from sand_sim.scene.filling import fill_grains, own_frames, smallest_of_materials, smallest_sphere
 from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.stable_step import DEEP
 from sand_sim.scene.time_step import TimeStep, choose_time_step, fastest_speed
@@ -45,6 +45,7 @@ class Assembly:
         light: the same as the time step must see it, see ``body_model.lighten``.
         fill_numbers: grains of each fill; their identities follow one another, those of the bodies come last.
         table: grains and bodies as the scene places them.
+        own_frames: of the clumps' files, to their principal frames, shape (bodies, 4); no rotation for the scene's bodies.
         walls: analytic surfaces.
         tools: in the order of the scene.
         bodies: in the order of the scene.
@@ -64,6 +65,7 @@ class Assembly:
     light: Scene
     fill_numbers: list[int]
     table: GrainTable
+    own_frames: np.ndarray
     walls: list[Wall]
     tools: list[ToolModel]
     bodies: list[BodyModel]
@@ -149,10 +151,11 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     order = material_order(scene)
     bodies = [model_body(body, scene, finest, progress) for body in scene.bodies]
     solids = [*walls, *tools, *grounds, *bodies]
-    fills = [
-        fill_grains(fill, scene.materials[scene.material_index(fill.material)], order.index(fill.material), solids)
-        for fill in scene.fills
-    ]
+    fills: list[GrainTable] = []
+    for fill in scene.fills:
+        material = scene.materials[scene.material_index(fill.material)]
+        others = [(one.name, table) for one, table in zip(scene.fills, fills, strict=False)]
+        fills.append(fill_grains(fill, material, order.index(fill.material), solids, others))
     table = GrainTable.join([*fills, *(body.table(order.index(body.body.material)) for body in bodies)])
     device = _open_device(scene, len(table))
     smallest = smallest_of_materials(scene.fills, table, order)
@@ -178,6 +181,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         light,
         [fill.grains for fill in fills],
         table,
+        own_frames(scene.fills, fills, len(table.bodies)),
         walls,
         tools,
         bodies,

@@ -91,7 +91,7 @@ class GrainCloud:
         spin: shape (n, 3) [rad/s]; zeros where grains do not turn.
         radius: shape (n,) [m]; of a rigid body, of the sphere about its centre of mass that holds it.
         mass: shape (n,) [kg].
-        orientation: principal frame to world frame, shape (n, 4); no rotation for single spheres.
+        orientation: frame of a clump's file, or principal frame of a body, to world frame, shape (n, 4); for spheres none.
     """
 
     identity: np.ndarray

@@ -109,7 +109,7 @@ def observe_grains(assembly: Assembly, spheres: GrainCloud | None = None) -> Gra
         bodies.seen_spin.numpy()[alive],
         assembly.body_extent[alive],
         table.bodies.mass[alive],
-        bodies.turn.numpy()[alive],
+        rotation.multiply(bodies.turn.numpy()[alive], assembly.own_frames[alive]),
     ]
     joined = [np.concatenate([part, row]) for part, row in zip(parts, rows, strict=True)]
     order = np.argsort(joined[0], kind="stable")

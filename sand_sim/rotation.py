@@ -6,15 +6,16 @@ _LEAST_LENGTH = 1e-6  # of a quaternion that somebody meant
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Rotation b, then rotation a, shape (4,)."""
-    (ax, ay, az, aw), (bx, by, bz, bw) = a, b
-    return np.array(
+    """Rotation b, then rotation a, shape (..., 4)."""
+    (ax, ay, az, aw), (bx, by, bz, bw) = (np.moveaxis(np.asarray(q, float), -1, 0) for q in (a, b))
+    return np.stack(
         [
             aw * bx + ax * bw + ay * bz - az * by,
             aw * by - ax * bz + ay * bw + az * bx,
             aw * bz + ax * by - ay * bx + az * bw,
             aw * bw - ax * bx - ay * by - az * bz,
-        ]
+        ],
+        axis=-1,
     )
 
 

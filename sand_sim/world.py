@@ -171,8 +171,11 @@ class World(Changeable):
         Once a frame, and whenever it is observed, the state is kept if energy is in order.
 
         Raises:
+            CommandError: if the number is negative.
             UnstableError: if the run has blown up; the world is then back in the last good state that was kept.
         """
+        if steps < 0:
+            raise CommandError("steps", f"a world is stepped forward, got {steps} steps; go back by 'restore'")
         if self._measured and self._measured[0] == self._solver.steps_done:
             self._keep()
         every = max(self.frame_steps, _FEWEST_BETWEEN)
@@ -308,7 +311,7 @@ class World(Changeable):
         self.restore(self._good)
         safe = self.assembly.safe_step(self._good_health.fastest, self._good_health.deepest)
         remedy = f"a time step of {0.995 * safe:.3g} s would be safe, it is {self.time_step:.3g} s"  # not more when rounded
-        if self.time_step < 1.01 * safe:
+        if self._overlap or self.time_step < 1.01 * safe:
             doubts = "; ".join(self._good_health.doubts) or "look for bodies that overlap or are too fast"
             remedy = f"the time step of {self.time_step:.2g} s is not at fault: {doubts}"
         return UnstableError(f"blown up at t = {blown:.6g} s: {cause}; kept is the state at t = {self.time:.6g} s; {remedy}")

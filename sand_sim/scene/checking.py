@@ -37,6 +37,11 @@ def check_scene(scene: Scene) -> None:
                 f"fills: '{fill.name}' height {fill.height:g} m does not fit its region; raise region.high[2] above "
                 f"{fill.low[2] + fill.height:g}"
             )
+        if fill.height is not None and scene.gravity[2] >= 0.0 and any(scene.gravity):
+            raise SceneError(
+                f"fills: '{fill.name}' has a 'height', up to which it is filled along z, but gravity is {list(scene.gravity)}; "
+                "give a 'count' instead"
+            )
     if scene.domain is not None:
         for fill in scene.fills:
             if fill.low is not None and not all(

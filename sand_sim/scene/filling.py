@@ -1,7 +1,7 @@
 """Where the grains of a fill start: loosely packed in their region, or as a file says."""
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from sand_sim import rotation
 from sand_sim.grain_table import GrainTable
 from sand_sim.scene.clumps import place_clumps
 from sand_sim.scene.npz import read_npz
+from sand_sim.scene.overlapping import TooManyPairsError, overlapping
 from sand_sim.scene.shapes import Shape, shape_named
 from sand_sim.scene.types import Fill, Material, SceneError, SizeDistribution
 from sand_sim.scene.walls import Wall
@@ -28,7 +29,9 @@ _COLUMNS = {
 }
 
 
-def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -> GrainTable:
+def fill_grains(
+    fill: Fill, material: Material, index: int, walls: list[Wall], others: Sequence[tuple[str, GrainTable]] = ()
+) -> GrainTable:
     """Place the grains of a fill.
 
     Args:
@@ -36,6 +39,7 @@ def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -
         material: of the grains.
         index: of the material in the scene.
         walls: surfaces that no grain may cut.
+        others: names and grains of fills that none may overlap, unless a file says where it lies.
 
     Raises:
         SceneError: if the region cannot hold them, or the file is unreadable.
@@ -43,8 +47,10 @@ def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -
     shape = shape_named(fill.shape, f"fills: '{fill.name}'")
     if fill.file is not None:
         columns = _read_file(fill)
-        placed = [columns.pop(name) for name in ("position", "radius", "orientation")]
-        return _table(*placed[:2], fill, material, index, shape, placed[2], **columns)
+        position, radius, turns = (columns.pop(name) for name in ("position", "radius", "orientation"))
+        if shape:
+            turns = rotation.multiply(turns, rotation.from_matrix(shape.axes))
+        return _table(position, radius, fill, material, index, shape, turns, **columns)
     random = np.random.default_rng(fill.seed)
     largest = _largest(fill.size) * (shape.bounding_radius / shape.equal_radius if shape else 1.0)
     points = _lattice(fill, largest, random)
@@ -52,6 +58,15 @@ def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -
     for wall in walls:
         clear = _clear(wall, points, largest)
         taken.append((wall.label, len(points) - clear.sum()))
+        points = points[clear]
+    for name, table in others:
+        clear = np.ones(len(points), bool)
+        try:
+            for one, _ in overlapping(points, np.full(len(points), largest), table.position, table.radius):
+                clear[one] = False
+        except TooManyPairsError as error:
+            raise SceneError(f"fills: '{fill.name}' and '{name}' share too large a region: {error}") from None
+        taken.append((f"fill '{name}'", len(points) - clear.sum()))
         points = points[clear]
     wanted = fill.count or _count_for_height(fill, walls, random)
     if wanted > len(points):
@@ -63,6 +78,16 @@ def fill_grains(fill: Fill, material: Material, index: int, walls: list[Wall]) -
     radius = _draw(fill.size, wanted, random)
     turns = rotation.at_random(wanted, random) if shape else None
     return _table(points[:wanted], radius, fill, material, index, shape, turns)
+
+
+def own_frames(fills: Iterable[Fill], tables: Iterable[GrainTable], bodies: int) -> np.ndarray:
+    """Rotations from the frames of the clumps' files to their principal frames, none for other bodies, shape (bodies, 4)."""
+    turns, first = np.tile([0.0, 0.0, 0.0, 1.0], (bodies, 1)), 0
+    for fill, table in zip(fills, tables, strict=True):
+        if shape := shape_named(fill.shape, f"fills: '{fill.name}'"):
+            turns[first : first + table.grains] = rotation.from_matrix(shape.axes.T)
+            first += table.grains
+    return turns
 
 
 def smallest_sphere(fills: Iterable[Fill]) -> float | None:

@@ -126,7 +126,6 @@ def tetrahedron() -> Shape:
     return shape_of_spheres(corners, np.ones(4))
 
 
-@cache
 def read_shape(path: Path) -> Shape:
     """A clump from a csv file with the columns x, y, z, radius [m], or an npz file with position and radius.
 
@@ -150,7 +149,12 @@ def read_shape(path: Path) -> Shape:
         raise SceneError(f"shape: file '{path.name}' holds no spheres; give one row x, y, z, radius for each")
     if not (np.all(np.isfinite(centres)) and np.all(radii > 0.0) and np.all(np.isfinite(radii))):
         raise SceneError(f"shape: file '{path.name}' has a radius that is not positive, or a value that is not finite")
-    return shape_of_spheres(centres, radii)
+    return _known_shape(centres.tobytes(), radii.tobytes())  # of the content, because a file may change
+
+
+@cache
+def _known_shape(centres: bytes, radii: bytes) -> Shape:
+    return shape_of_spheres(np.frombuffer(centres).reshape(-1, 3), np.frombuffer(radii))
 
 
 def shape_named(name: str | Path, where: str) -> Shape | None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import yaml
-from scenes import SceneMaker, write_small_scene
+from scenes import SceneMaker, floor, write_small_scene
 
 from sand_sim import SceneError, World, read_scene
 from sand_sim.scene.filling import fill_grains
@@ -110,6 +110,47 @@ def test_bed_filled_by_height_has_that_height(tmp_path):
     assert min(surface) > 0.05 - 0.012
     assert world.time == 0.0
     assert world.observe().health.retired == 0
+
+
+@pytest.mark.parametrize("gravity", [[0.0, 0.0, 9.81], [9.81, 0.0, 0.0]])
+def test_a_height_across_gravity_is_refused(tmp_path, gravity):
+    scene = SceneMaker(tmp_path).scene([[0.0, 0.0, 0.0]], 0.005, gravity=gravity)
+    region = {"low": [0.0, 0.0, 0.0], "high": [0.1, 0.1, 0.1]}
+    scene["fills"] = [{"material": "grain", "radius": 0.005, "region": region, "height": 0.05}]
+    with pytest.raises(SceneError, match="give a 'count' instead"):
+        read_scene(scene, tmp_path)
+
+
+def test_fills_keep_clear_of_those_before_them(tmp_path):
+    first = fill_grains(fill(count=300), SAND, 0, [])
+    second = fill_grains(fill(count=300, seed=1), SAND, 0, [], [("bed", first)])
+    assert nearest(np.concatenate([first.position, second.position])) > 0.01 * (1.0 - 1e-9)
+    with pytest.raises(SceneError, match="fill 'bed' takes"):
+        fill_grains(fill(count=800, seed=1), SAND, 0, [], [("bed", fill_grains(fill(count=1000), SAND, 0, []))])
+
+
+def test_falling_grains_are_not_taken_for_resting_ones(tmp_path):
+    """One grain, 0.1 m up, which is as slow as asked for the first 10 ms."""
+    scene = SceneMaker(tmp_path).scene([[0.0, 0.0, 0.1]], 0.004, gravity=[0.0, 0.0, -9.81], restitution=0.3)
+    scene |= {"boundaries": floor(), "settle": {"time": 1.0, "speed": 0.1}}
+    grains = World(read_scene(scene, tmp_path)).observe().grains
+    assert grains.position[0, 2] == pytest.approx(0.004, rel=0.02)
+
+
+def test_a_settled_bed_of_clumps_goes_into_another_scene(tmp_path):
+    """As docs/python.md says: radii are those of spheres of the same volume."""
+    region = {"low": [0.0, 0.0, 0.0], "high": [0.06, 0.06, 0.1]}
+    box = {"type": "box", "material": "wall", "open": ["top"]} | region
+    bed = {"material": "grain", "shape": "tetrahedron", "radius": 0.005, "region": region, "count": 60}
+    before = settled(tmp_path, [bed], [box]).observe()
+    radius = np.cbrt(0.75 * before.grains.mass / (np.pi * 2500.0))
+    columns = {"position": before.grains.position, "orientation": before.grains.orientation}
+    np.savez(tmp_path / "bed.npz", radius=radius, **columns)
+    scene = SceneMaker(tmp_path).scene([[0.0, 0.0, 0.0]], 0.005, gravity=[0.0, 0.0, -9.81], precision="single")
+    scene |= {"fills": [{"material": "grain", "shape": "tetrahedron", "file": "bed.npz"}], "boundaries": [box]}
+    after = World(read_scene(scene, tmp_path)).observe()
+    assert after.grains.mass == pytest.approx(before.grains.mass, rel=1e-6)
+    assert after.spheres.position == pytest.approx(before.spheres.position, abs=1e-5 * 0.005)
 
 
 def test_two_materials_lie_together(tmp_path):

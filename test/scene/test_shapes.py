@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scenes import SceneMaker
 
-from sand_sim import SceneError
+from sand_sim import SceneError, World, read_scene
 from sand_sim.scene.shapes import read_shape, shape_of_spheres, tetrahedron, union_properties
 
 
@@ -41,6 +42,36 @@ def test_tetrahedron_is_isotropic_and_regular():
     apart = np.linalg.norm(shape.centres[:, None] - shape.centres[None], axis=2)
     assert apart[np.triu_indices(4, 1)] == pytest.approx(1.2, rel=1e-6)
     assert np.abs(shape.centres.sum(axis=0)).max() < 1e-6
+
+
+def clumps_of_a_file(folder, rows, orientation):
+    (folder / "clump.csv").write_text("x,y,z,radius\n" + "".join(",".join(map(str, row)) + "\n" for row in rows))
+    np.savez(folder / "grains.npz", position=[[0.0, 0.0, 0.0]], radius=[0.01], **orientation)
+    scene = SceneMaker(folder).scene([[0.0, 0.0, 0.0]], 0.01)
+    scene["fills"] = [{"material": "grain", "file": "grains.npz", "shape": "clump.csv"}]
+    return World(read_scene(scene, folder))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_clumps_lie_as_their_file_has_them(tmp_path, axis):
+    """And as their orientation turns them; what is observed can be given back as a file."""
+    rows = np.zeros((2, 4))
+    rows[:, axis], rows[:, 3] = (-1.0, 1.0), 1.0
+    world = clumps_of_a_file(tmp_path, rows, {})
+    spheres, grains = world.observe().spheres.position, world.observe().grains
+    assert np.ptp(spheres, axis=0) == pytest.approx(np.ptp(rows[:, :3], axis=0) * 0.01 / 2.0 ** (1 / 3), abs=1e-6)
+    half = np.sqrt(0.5)
+    assert np.abs(grains.orientation) == pytest.approx(np.array([[0.0, 0.0, 0.0, 1.0]]), abs=1e-6)
+    turned = clumps_of_a_file(tmp_path, rows, {"orientation": [[0.0, 0.0, half, half]]}).observe()
+    assert np.ptp(turned.spheres.position, axis=0)[[1, 0, 2]] == pytest.approx(np.ptp(spheres, axis=0), abs=1e-6)
+    again = clumps_of_a_file(tmp_path, rows, {"orientation": turned.grains.orientation}).observe()
+    assert again.spheres.position == pytest.approx(turned.spheres.position, abs=1e-7)
+
+
+def test_a_clump_file_that_has_changed_is_read_again(tmp_path):
+    rows = [[-1.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 1.0]]
+    assert len(clumps_of_a_file(tmp_path, rows, {}).observe().spheres.position) == 2
+    assert len(clumps_of_a_file(tmp_path, [*rows, [0.0, 1.0, 0.0, 1.0]], {}).observe().spheres.position) == 3
 
 
 @pytest.mark.parametrize(
