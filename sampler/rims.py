@@ -7,7 +7,7 @@ from sampler.surface import Surface
 from sampler.topology import edges_of
 
 _OUT, _PER_SPACING = 0.5, 3.0  # beyond rims, in spacings: over half a lattice row, which covers them; so many per spacing
-_ASKED, _WAYS, _FAR = 5.0, 8, 0.6  # places per squared spacing from which rims are sought, in so many ways, so far, in spacings
+_ASKED, _WAYS, _FAR = 10.0, 8, 0.6  # places per squared spacing from which rims are sought, in so many ways, so far, in spacings
 _GONE, _LEVEL = 0.05, 0.3  # how far from a layer, in spacings, it has ended, and how far out of its plane, by the sine
 
 
