@@ -15,7 +15,8 @@ from sampler.spreading_kernels import push_apart, throw_darts
 
 _SCATTERED = 12  # random places per wanted particle
 _HALVINGS = 7  # of the range in which the distance of the first placing is sought
-_TURNS, _FEW, _REFILL_TURNS = 60, 1000, 10  # few particles turn twice as often: more of them lie on rims and small pieces
+_TURNS, _REFILL_TURNS = 60, 10
+_FEW = (100, 8), (1000, 2)  # fewer particles turn so many times as often: more of them lie on rims and small pieces, or in rows
 _REFILLS = 16
 _SAMPLED = 40  # places per particle at which gaps are looked for, over the area; and as many over the edges
 _CONFIRMED, _LOOKS = 60, 3  # and at fresh ones where hardly any is left, until none is found there, so often at most
@@ -58,7 +59,7 @@ def spread_particles(
     start = number - int(_SPARE * number)
     points, normals, state.apart = _throw(skin, start, state.spacing, random)
     state.place(points, normals, np.zeros(start, bool))
-    turns = 2 * _TURNS if number < _FEW else _TURNS
+    turns = _TURNS * next((times for few, times in _FEW if number < few), 1)
     total = turns + _REFILLS * _REFILL_TURNS
     for turn in range(turns):
         state.push(_STRENGTH * (1.0 - 0.8 * turn / turns))

@@ -97,14 +97,14 @@ def test_mesh_terrain_lies_at_its_pose(make_ground, tmp_path):
 
     trimesh.creation.box((60.0, 40.0, 10.0)).export(tmp_path / "block.stl")
     pose = {"position": [1.0, 2.0, 3.0], "rpy": [np.pi / 2, 0.0, 0.0]}
-    terrain = {"mesh": "block.stl", "scale": 0.001, "pose": pose, "spacing": None}
-    world = make_ground(
-        [[1.0, 2.0, 3.0 + 0.02 + 0.003 + RADIUS]], terrain, contact={"rolling": "spring"}, numbers={"rolling_friction": 0.3}
-    )
+    fine = 0.002  # so that dimples between its particles are less wide than what is allowed below
+    terrain = {"mesh": "block.stl", "scale": 0.001, "pose": pose, "spacing": None, "particle_radius": fine}
+    on_top = [1.0, 2.0, 3.0 + 0.02 + fine + RADIUS]
+    world = make_ground([on_top], terrain, contact={"rolling": "spring"}, numbers={"rolling_friction": 0.3})
     world.step(round(0.3 / world.time_step))
     observation = world.observe()
     weight = observation.grains.mass[0] * GRAVITY
-    assert observation.grains.position[0] == pytest.approx([1.0, 2.0, 3.0 + 0.02 + 0.003 + RADIUS], abs=2e-3)
+    assert observation.grains.position[0] == pytest.approx(on_top, abs=2e-3)
     assert observation.wall("ground").force == pytest.approx([0.0, 0.0, -weight], abs=5e-3 * weight)
     assert observation.health.tool_work == 0.0
 
