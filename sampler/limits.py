@@ -45,6 +45,16 @@ def check_scale(triangles: np.ndarray, radius: float, spacing: float) -> None:
         raise too_many(area, number, radius)
 
 
+def check_thickness(thickness: float, radius: float, size: float) -> None:
+    """Refuse sheets thicker [m] than a mesh is large [m], unless its particles, by their radius [m], are as well.
+
+    Raises:
+        MeshError: if they are.
+    """
+    if thickness > max(2.0 * radius, size):
+        raise MeshError(f"sheets {thickness:.3g} m thick cannot be meant in a mesh {size:.3g} m across; check the units")
+
+
 def too_many(area: float, number: float, radius: float) -> MeshError:
     """What to say of an area [m^2] that would need too many particles of a radius [m]."""
     return MeshError(

@@ -66,7 +66,7 @@ def check_mesh(mesh: trimesh.Trimesh, name: str = "mesh") -> trimesh.Trimesh:
     """Refuse triangles that cannot be worked with.
 
     Raises:
-        MeshError: if it is none, there are none, they refer to missing vertices, are not finite or have no area.
+        MeshError: if it is no mesh, has no triangles, or they refer to missing vertices, are not finite, too far or have no area.
     """
     if not isinstance(mesh, trimesh.Trimesh):
         raise MeshError(f"mesh {name}: must be a trimesh.Trimesh, got {type(mesh).__name__}; sampler.read_mesh reads files")

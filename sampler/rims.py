@@ -3,7 +3,7 @@
 import numpy as np
 
 from sampler.skin import Skin
-from sampler.surface import Surface
+from sampler.surface import Surface, tangents
 from sampler.topology import edges_of
 
 _OUT, _PER_SPACING = 0.5, 3.0  # beyond rims, in spacings: over half a lattice row, which covers them; so many per spacing
@@ -40,9 +40,8 @@ def beyond_layers(layers: np.ndarray, around: Surface, spacing: float) -> np.nda
         return np.zeros((0, 3))
     layers = Skin(layers, around.device)
     points, normals = layers.sample(1 + int(_ASKED * layers.areas.sum() / spacing**2), np.random.default_rng(0))
-    aside = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
-    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
-    beside, found = np.cross(normals, aside), []
+    aside, beside = tangents(normals)
+    found = []
     for angle in 2.0 * np.pi * np.arange(_WAYS) / _WAYS:
         places = points + _FAR * spacing * (np.cos(angle) * aside + np.sin(angle) * beside)
         rim, face = layers.closest(places)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sampler.surface import Surface
+from sampler.surface import Surface, tangents
 
 _WIDE = 1.5  # by how much wider than thick strips are at most that get one row, in spacings
 _CHORDS = 6  # ways across that are tried
@@ -83,8 +83,7 @@ def _sections(skin: Surface, points: np.ndarray, normals: np.ndarray, limit: flo
         Their middles, shape (n, 3) [m]; where the solid leads, across both ways, shape (n, 3); the way in which it is thinnest,
         shape (n, 3); the longer and the shorter way through, shape (n,) [m], infinite where there is no end.
     """
-    aside = _units(np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)]))
-    beside = np.cross(normals, aside)
+    aside, beside = tangents(normals)
     middle, through = points.copy(), np.full(len(points), np.inf)
     width, across, along = through.copy(), aside.copy(), beside.copy()
     for angle in np.arange(_CHORDS) * np.pi / _CHORDS:

@@ -10,7 +10,7 @@ from sampler.body import Evenness, ParticleBody
 from sampler.errors import MeshError
 from sampler.inset import Inside, inset_triangles
 from sampler.lattice import lattice_spacing, particle_count
-from sampler.limits import MOST, broken_limits, check_scale, too_many
+from sampler.limits import MOST, broken_limits, check_scale, check_thickness, too_many
 from sampler.mass import count_inside, integrate, is_physical, joined, openness
 from sampler.measuring import measure_evenness
 from sampler.options import check_options
@@ -73,9 +73,8 @@ def sample_body(
     check_options(lengths, count, seed, device)
     repaired = mesh if isinstance(mesh, RepairedMesh) else repair_mesh(mesh, sheets)
     thickness = 2.0 * radius if thickness is None else thickness
-    if thickness > max(2.0 * radius, repaired.diagonal) and np.any(repaired.kind == SHEET):
-        size = repaired.diagonal
-        raise MeshError(f"sheets {thickness:.3g} m thick cannot be meant in a mesh {size:.3g} m across; check the units")
+    if np.any(repaired.kind == SHEET):
+        check_thickness(thickness, radius, repaired.diagonal)
     check_scale(repaired.triangles, radius, _spacing(radius, spacing, count, grain, repaired.triangles))
     closed, owner = closed_triangles(repaired, thickness)
     fine = _spacing(radius, spacing, count, grain, closed)

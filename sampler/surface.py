@@ -287,6 +287,13 @@ class Surface:
         launch_shares(kernel, len(outputs[0]), [self.mesh.id, *inputs], outputs, self.device)
 
 
+def tangents(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors across each unit normal, shape (n, 3), and across each other; both shape (n, 3)."""
+    aside = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    aside /= np.maximum(np.linalg.norm(aside, axis=1, keepdims=True), np.finfo(float).tiny)
+    return aside, np.cross(normals, aside)
+
+
 def _upright(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Normals of triangles, shape (n, 3, 3) [m], twice as long as their areas [m^2], and these."""
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

@@ -26,9 +26,9 @@ def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> N
     if asked.time <= 0.0:
         return
     chunk = max(1, round(asked.time / _CHUNKS / step))
-    # Grains that begin to fall, or turn back in a bounce, are slow for as long as this.
-    gravity, slow = float(np.linalg.norm(assembly.scene.gravity)), 0.0
-    falling = 2.0 * asked.speed / gravity if gravity else 0.0
+    gravity = float(np.linalg.norm(assembly.scene.gravity))
+    turning = 2.0 * asked.speed / gravity if gravity else 0.0  # so long grains that begin to fall or turn are slow
+    slow = 0.0
     for done in range(_CHUNKS):
         try:
             assembly.solver.run(chunk)
@@ -40,7 +40,7 @@ def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> N
         speed = np.sqrt(np.sum(cloud.mass * cloud.speed**2) / np.sum(cloud.mass))
         progress("settling", (done + 1) / _CHUNKS)
         slow = slow + chunk * step if speed < asked.speed else 0.0
-        if slow > falling:
+        if slow > turning:
             progress("settling", 1.0)
             break
 

@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -55,18 +56,14 @@ def fill_grains(
     largest = _largest(fill.size) * (shape.bounding_radius / shape.equal_radius if shape else 1.0)
     points = _lattice(fill, largest, random)
     places, taken = len(points), []
-    for wall in walls:
-        clear = _clear(wall, points, largest)
-        taken.append((wall.label, len(points) - clear.sum()))
-        points = points[clear]
-    for name, table in others:
-        clear = np.ones(len(points), bool)
+    obstacles = [(wall.label, partial(_clear, wall)) for wall in walls]
+    obstacles += [(f"fill '{name}'", partial(_clear_of_grains, table)) for name, table in others]
+    for label, is_clear in obstacles:
         try:
-            for one, _ in overlapping(points, np.full(len(points), largest), table.position, table.radius):
-                clear[one] = False
+            clear = is_clear(points, largest)
         except TooManyPairsError as error:
-            raise SceneError(f"fills: '{fill.name}' and '{name}' share too large a region: {error}") from None
-        taken.append((f"fill '{name}'", len(points) - clear.sum()))
+            raise SceneError(f"fills: '{fill.name}' shares too large a region with {label}: {error}") from None
+        taken.append((label, len(points) - clear.sum()))
         points = points[clear]
     wanted = fill.count or _count_for_height(fill, walls, random)
     if wanted > len(points):
@@ -124,6 +121,14 @@ def _clear(solid, points: np.ndarray, gap: float) -> np.ndarray:
     near = np.all((points > low - gap) & (points < high + gap), axis=1)
     clear = ~near
     clear[near] = solid.distance(points[near]) > gap
+    return clear
+
+
+def _clear_of_grains(table: GrainTable, points: np.ndarray, gap: float) -> np.ndarray:
+    """Whether spheres as large as a gap would overlap none of a table, shape (n,)."""
+    clear = np.ones(len(points), bool)
+    for one, _ in overlapping(points, np.full(len(points), gap), table.position, table.radius):
+        clear[one] = False
     return clear
 
 
