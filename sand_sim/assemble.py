@@ -17,7 +17,7 @@ from sand_sim.engine.tool_body import ToolBody
 from sand_sim.grain_table import GrainTable
 from sand_sim.playing import check_trajectory
 from sand_sim.precision import PRECISIONS, Precision
-from sand_sim.scene.checking import check_scene
+from sand_sim.scene.checking import check_scene, unused_numbers
 from sand_sim.scene.filling import fill_grains, own_frames, smallest_of_materials, smallest_sphere
 from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.stable_step import DEEP
@@ -118,7 +118,7 @@ class Assembly:
     def warnings(self) -> list[str]:
         """What the user should know before the run."""
         meshes = [f"{label}: {text}" for label, texts in self.mesh_warnings.items() for text in texts]
-        return [self.time_step.warning, *meshes] if self.time_step.warning else meshes
+        return [*filter(None, [self.time_step.warning]), *unused_numbers(self.scene), *meshes]
 
     def safe_step(self, speed: float, depth: float) -> float:
         """The step [s] that would be safe at a top speed [m/s] and an overlap over radius [1]."""

@@ -11,20 +11,27 @@ from sand_sim.tool_model import Progress
 _CHUNKS = 50
 
 
-def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> None:
-    """Let the grains come to rest as the scene asks.
+def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> list[str]:
+    """Let the grains come to rest as the scene asks, and strike off what then lies above the height of its fill.
 
     Args:
         assembly: the world's.
         doubts: that were there before the first step.
         progress: called with the name of the stage and the share of it that is done, 0 to 1.
 
+    Returns:
+        What the user should know: that the grains have not come to rest.
+
     Raises:
         SceneError: if the bed blows up.
     """
+    told = _come_to_rest(assembly, doubts, progress) if assembly.scene.settle.time > 0.0 else []
+    _strike_off(assembly)
+    return told
+
+
+def _come_to_rest(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> list[str]:
     asked, step = assembly.scene.settle, assembly.time_step.value
-    if asked.time <= 0.0:
-        return
     chunk = max(1, round(asked.time / _CHUNKS / step))
     gravity = float(np.linalg.norm(assembly.scene.gravity))
     turning = 2.0 * asked.speed / gravity if gravity else 0.0  # so long grains that begin to fall or turn are slow
@@ -42,10 +49,14 @@ def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> N
         slow = slow + chunk * step if speed < asked.speed else 0.0
         if slow > turning:
             progress("settling", 1.0)
-            break
+            return []
+    return [
+        f"settle: grains still move at {speed:.2g} m/s (root mean square) after {asked.time:g} s, speed {asked.speed:g} m/s was "
+        "asked; give it more time or ask for less"
+    ]
 
 
-def strike_off(assembly: Assembly) -> None:
+def _strike_off(assembly: Assembly) -> None:
     """Take away what lies above the asked height of a fill."""
     cloud, first = observe_grains(assembly), 0
     for fill, number in zip(assembly.scene.fills, assembly.fill_numbers, strict=True):

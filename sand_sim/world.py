@@ -27,7 +27,7 @@ from sand_sim.observing import (
 )
 from sand_sim.scene.types import Scene
 from sand_sim.scene_identity import describe_scene
-from sand_sim.settling import settle, strike_off
+from sand_sim.settling import settle
 from sand_sim.sweeping import SweptGround
 from sand_sim.tool_model import Progress, ToolModel
 from sand_sim.track import SPEED_TOLERANCE, Track, travel
@@ -41,6 +41,7 @@ class World(Changeable):
 
     Attributes:
         scene: it was made from.
+        warnings: what the user should know before the run.
         identity: what a state must have in common with it, see ``scene_identity``; told now, because files may go.
 
     Args:
@@ -60,8 +61,7 @@ class World(Changeable):
         self._solver.renew_lists()
         self._overlap = find_overlap(self.assembly)
         self._beforehand = self._overlap + find_fine_surfaces(self.assembly) + find_coarseness(self.assembly)
-        settle(self.assembly, self._beforehand, progress)
-        strike_off(self.assembly)
+        self.warnings = self.assembly.warnings + settle(self.assembly, self._beforehand, progress)
         self._solver.begin()
         self._solver.engage_plungers()
         self._start = start_energy(self.assembly)
@@ -131,6 +131,8 @@ class World(Changeable):
         Raises:
             CommandError: as ``check``, and if the time has passed or the tool would be too fast; the world is unchanged then.
         """
+        if isinstance(command, ToolVelocity):
+            raise CommandError("velocity", "a world moves tools to poses; give it those of 'pose_after(velocity, duration)'")
         command = self.check(command)
         tool, index, now = f"tool '{command.tool}'", self._tool_index[command.tool], self.time
         if command.time is not None and command.time <= now:
@@ -189,8 +191,7 @@ class World(Changeable):
 
     def observe(self) -> Observation:
         """What the world shows now; forces on tools are means since the last observation."""
-        steps, health = self._solver.steps_done, self._health()
-        spheres = observe_spheres(self.assembly)
+        steps, health, spheres = self._solver.steps_done, self._health(), observe_spheres(self.assembly)
         cloud = observe_grains(self.assembly, spheres)
         reports = observe_tools(self.assembly, self._tracks, cloud, self.time, self._mean_wrenches(steps), self._sweep())
         bodies = observe_bodies(self.assembly, cloud)

@@ -62,7 +62,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         )
     recorder = _open_recorder(world, log, options, console.tell)
     recorder.write(world.observe())
-    for warning in world.assembly.warnings:
+    for warning in world.warnings:
         console.tell(f"warning: {warning}")
     begin = world.time + 0.5 * world.time_step
     for time in (time for time in frame_times(scene, options.duration) if time > begin):

@@ -197,7 +197,7 @@ class SandSimNode(LifecycleNode):
         self._endings.callback(self.simulation.stop)  # before what it publishes to goes
         if parameters["resume"]:
             self.simulation.resume()
-        for warning in (*world.assembly.warnings, *coarse_points(world)):
+        for warning in (*world.warnings, *coarse_points(world)):
             self.get_logger().warning(warning)
         for name, similar in parameters.misspelt().items():
             self.get_logger().warning(f"there is no parameter '{name}'" + (f"; is '{similar}' meant?" if similar else ""))

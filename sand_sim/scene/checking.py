@@ -3,6 +3,7 @@
 from itertools import combinations_with_replacement
 
 from sand_sim.contact.law import ASKS
+from sand_sim.contact.model import SLOTS
 from sand_sim.scene.types import Scene, SceneError
 
 
@@ -49,6 +50,18 @@ def check_scene(scene: Scene) -> None:
                 for d_low, low, high, d_high in zip(scene.domain[0], fill.low, fill.high, scene.domain[1], strict=True)
             ):
                 raise SceneError(f"domain: must contain the region of fill '{fill.name}', its grains would be retired at once")
+
+
+def unused_numbers(scene: Scene) -> list[str]:
+    """What the scene gives for the sake of contact laws that it has not chosen, for whoever forgot to choose them."""
+    told, chosen = [], set(scene.contact.asks)
+    for name in dict.fromkeys(name for rule in scene.pairs for name in rule.numbers):
+        if name not in chosen:
+            ways = [f"{slot}: {law}" for slot, laws in SLOTS.items() for law in laws if name in laws[law].asks]
+            told.append(f"pairs: '{name}' has no effect; the section 'contact' would have to say {', or '.join(ways)}")
+    if scene.liquid is not None and scene.contact.cohesion != "capillary":
+        told.append("liquid: has no effect; the section 'contact' would have to say cohesion: capillary")
+    return told
 
 
 def _check_pairs(scene: Scene, known: set[str]) -> None:

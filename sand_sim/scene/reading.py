@@ -165,14 +165,15 @@ def _size(entry: Field) -> SizeDistribution:
     if not isinstance(entry.value, dict):
         return SizeDistribution("constant", mean=entry.number(above=0.0, unit="m"))
     if "uniform" in entry.value:
-        entry.keys(("uniform",))
-        low, high = entry["uniform"].vector(2)
+        low, high = entry.keys(("uniform",))["uniform"].vector(2)
         kind = SizeDistribution("uniform", low=low, high=high)
     elif "normal" in entry.value:
         normal = entry.keys(("normal",))["normal"].keys(("mean", "deviation", "low", "high"), ("mean", "deviation"))
         mean, deviation = normal["mean"].number(above=0.0, unit="m"), normal["deviation"].number(least=0.0, unit="m")
-        low = normal.optional("low", Field.number, mean - 2.0 * deviation)
+        low = normal.optional("low", lambda f: f.number(above=0.0, unit="m"), mean - 2.0 * deviation)
         high = normal.optional("high", Field.number, mean + 2.0 * deviation)
+        if low <= 0.0:
+            raise normal.refuse(f"is cut two deviations below the mean, at {low:g} m, which is no radius; give a 'low'")
         kind = SizeDistribution("normal", mean=mean, deviation=deviation, low=low, high=high)
         if low <= high and (share := _share_between(kind)) < _FEWEST:
             raise normal.refuse(

@@ -65,6 +65,11 @@ def test_good_scene_is_read():
         (("fills", 0, "material"), "gravel", "unknown material 'gravel'"),
         (("fills", 0, "region", "high"), [0.1, 0.1, -0.1], "fills[0].region: 'low'"),
         (("boundaries", 0, "type"), "sphere", "boundaries[0].type: unknown 'sphere'; known are plane, box, cylinder"),
+        (
+            ("fills", 0, "radius"),
+            {"normal": {"mean": 0.003, "deviation": 0.002}},
+            "fills[0].radius.normal: is cut two deviations below the mean, at -0.001 m, which is no radius; give a 'low'",
+        ),
         (("boundaries", 0, "normal"), [0, 0, 0], "boundaries[0].normal: must not be the zero vector"),
         (("boundaries", 0, "normal"), [0, 0, float("nan")], "boundaries[0].normal[2]: must be finite"),
         (("tools", "spade", "particle_radius"), 0, "tools.spade.particle_radius: must be greater than 0"),
