@@ -21,13 +21,30 @@ def find_overlap(assembly: Assembly) -> tuple[str, ...]:
     if sums.deepest > DEEP or driven > _harmless(assembly):
         share = f"{100.0 * sums.deepest:.2g} % of a radius"
         stored = f"the {sums.elastic:.3g} J stored there drive them apart"
-        doubts.append(f"grains overlap by {share} at the start; {stored}, at some {driven:.2g} m/s")
+        doubts.append(f"grains overlap {_strained(assembly)} by {share} at the start; {stored}, at some {driven:.2g} m/s")
     position = observe_grains(assembly).position
     for tool in assembly.tools:
         inside = int((tool.distance(position) < -tool.margin).sum())
         if inside:
             doubts.append(f"grains start inside tool '{tool.tool.name}' ({inside} of them), where nothing touches them")
     return tuple(doubts)
+
+
+def _strained(assembly: Assembly) -> str:
+    """What grains overlap where most energy is stored in a contact."""
+    arrays, most = assembly.solver.arrays, {}
+    for name, contacts in arrays.lists.items():
+        energy = arrays.energy[name].numpy()[: contacts.pairs.get()]
+        if len(energy):
+            at = int(np.argmax(energy))
+            most[name] = energy[at], int(contacts.partner.numpy()[at])
+    name = max(most, key=most.get)
+    partner = most[name][1]
+    if name == "wall":
+        return assembly.walls[np.searchsorted(arrays.walls.numpy()["first"], partner, side="right") - 1].label
+    if name == "tool":
+        return [*assembly.tools, *assembly.grounds][arrays.tools.tool_of.numpy()[partner]].label
+    return "one another"
 
 
 def _harmless(assembly: Assembly) -> float:

@@ -76,7 +76,9 @@ def test_slight_overlap_of_stiff_grains_is_doubted(make_world, young):
     further = {"gravity": [0.0, 0.0, -9.81], "restitution": 0.9, "friction": 0.0}
     world = make_world(stack(3, 0.01), RADIUS, boundaries=floor(), material=grain, **further)
     expected = np.sqrt(2.0 * 9.81 * np.ptp(stack(3, 0.01)[:, 2]))
-    doubted = any("grains overlap by 1 % of a radius at the start" in doubt for doubt in world.observe().health.doubts)
+    doubted = any(
+        "grains overlap one another by 1 % of a radius at the start" in doubt for doubt in world.observe().health.doubts
+    )
     fastest = 0.0
     for _ in range(60):
         world.step(20)
@@ -98,3 +100,17 @@ def test_grains_that_are_held_together_are_not_doubted(make_world):
     world = make_world(places, RADIUS, boundaries=[*floor(), lid], material=grain)
     assert world.observe().health.elastic > 0.0
     assert world.observe().health.doubts == ()
+
+
+def test_what_grains_overlap_most_is_named(make_world, tmp_path):
+    trimesh.creation.box((0.02, 0.02, 0.002)).export(tmp_path / "plate.stl")
+    tool = {"mesh": "plate.stl", "material": "wall", "particle_radius": 0.002, "pose": {"position": [0.0, 0.0, 0.05]}}
+    above = 0.051 + 0.002 + RADIUS
+    further = {"boundaries": floor(), "tools": {"plate": tool}, "domain": {"low": [-0.1] * 3, "high": [0.1] * 3}}
+    for places, what in [
+        ([[0.0, 0.0, 0.8 * RADIUS], [0.0, 0.0, 2.75 * RADIUS]], "wall 'floor' by 20 %"),
+        ([[0.0, 0.0, 0.98 * RADIUS], [0.0, 0.0, 2.8 * RADIUS]], "one another by 18 %"),
+        ([[0.0, 0.0, above - 0.3 * RADIUS], [0.0, 0.0, 0.9 * RADIUS]], "tool 'plate' by"),
+    ]:
+        doubts = make_world(places, RADIUS, **further).observe().health.doubts
+        assert any(doubt.startswith(f"grains overlap {what}") for doubt in doubts), doubts

@@ -150,7 +150,7 @@ def test_a_bed_that_blows_up_while_settling_is_refused(tmp_path):
 def test_overlap_at_the_start_is_a_doubt(make_world):
     world = make_world([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0075]], 0.005)
     doubts = world.observe().health.doubts
-    assert any("grains overlap by 50 % of a radius at the start" in doubt for doubt in doubts)
+    assert any("grains overlap one another by 50 % of a radius at the start" in doubt for doubt in doubts)
 
 
 def test_simulation_stops_answers_and_comes_back(tmp_path):
