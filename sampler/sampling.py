@@ -16,7 +16,7 @@ from sampler.measuring import measure_evenness
 from sampler.options import check_options
 from sampler.repair import SHEET, RepairedMesh, repair_mesh
 from sampler.rims import beyond_edges, beyond_layers
-from sampler.sheets import closed_triangles, thick_plates
+from sampler.sheets import closed_triangles, plates_outside, thick_plates
 from sampler.skin import Skin, coinciding_layers, free_triangles, touchable_parts, winding_before
 from sampler.spreading import Observer, spread_particles
 from sampler.surface import Surface
@@ -86,7 +86,7 @@ def sample_body(
         solid = Surface(closed[owner != SHEET], device)
         plates = free_triangles(repaired.vertices[sheet], solid, fine)[0]
     free, parent, layers = free_triangles(solid.triangles, solid, fine)
-    volume, centre, inertia, doubts = _mass(solid, around, free, parent, layers, thick_plates(plates, thickness), repaired.closed)
+    volume, centre, inertia, doubts = _mass(solid, around, free, parent, layers, plates, thickness, repaired.closed)
     if solid is not around:
         free = np.concatenate([free, plates])
     elif len(sheet):
@@ -237,8 +237,8 @@ def _spacing(radius, spacing, count, grain, triangles) -> float:
     return fine if grain is None else min(fine, _CLOSED * (radius + grain) / _COVERED)
 
 
-def _mass(solid, around, free, parent, layers, plates, closed) -> tuple[float, np.ndarray, np.ndarray, list[str]]:
-    """From all triangles of the solid where all are free, apart and outward, else from its free parts; and from plates.
+def _mass(solid, around, free, parent, layers, plates, thickness, closed) -> tuple[float, np.ndarray, np.ndarray, list[str]]:
+    """From all triangles of the solid where all are free, apart and outward, else from its free parts; and from plates so thick.
 
     Returns:
         Volume [m^3], centre, shape (3,) [m], inertia for a density of one, shape (3, 3) [m^5]; warnings.
@@ -250,19 +250,25 @@ def _mass(solid, around, free, parent, layers, plates, closed) -> tuple[float, n
         pieces, share = free, 1.0 / layers
         why = "buried in others, or inside out where it crosses itself" if turned.any() else "buried in others"
         warnings.append(f"parts of the surface are {why}; volume and inertia are those of the union")
-    parts = [integrate(*part) for part in ((pieces, share), (plates, 1.0)) if len(part[0])]
+    parts = [integrate(pieces, share)] if len(pieces) else []
     if len(pieces) and not (closed and openness(pieces, share) < _OPEN):
         warnings.append("the surface does not close, so volume and inertia are counted from places inside of it")
         parts[0] = count_inside(solid)
+    corners = solid.triangles.reshape(-1, 3)
+    if len(plates):
+        prisms, outside = thick_plates(plates, thickness), plates_outside(plates, thickness, solid)
+        corners = np.concatenate([corners, prisms.reshape(-1, 3)])
+        parts.append(outside or integrate(prisms))
+        if outside:
+            warnings.append("sheets reach into solids, so what they add to volume and inertia is counted from places beside them")
     volume, centre, inertia = joined(parts)
-    corners = np.concatenate([solid.triangles, plates]).reshape(-1, 3)
     low, high = corners.min(axis=0), corners.max(axis=0)
     if is_physical(volume, centre, inertia, low, high):
         return volume, centre, inertia, warnings
-    if len(plates):  # those that lie on the solid or one another count twice
+    if len(plates):  # those that lie on one another count twice
         volume, centre, inertia = count_inside(around)
         if is_physical(volume, centre, inertia, low, high):
-            warnings.append("sheets overlap solids, so volume and inertia are counted from places inside of them")
+            warnings.append("sheets overlap, so volume and inertia are counted from places inside of them")
             return volume, centre, inertia, warnings
     warnings.append("the surface encloses no sound volume; mass and inertia must be given by hand")
     return float("nan"), solid.triangles.mean(axis=(0, 1)), np.full((3, 3), np.nan), warnings

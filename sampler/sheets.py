@@ -3,9 +3,13 @@
 import numpy as np
 
 from sampler.caps import close_holes
+from sampler.mass import joined
 from sampler.repair import SHEET, RepairedMesh
+from sampler.skin import Skin
 from sampler.surface import Surface
 from sampler.topology import edges_of, halves_around, link_items
+
+_PAIRS = 10_000  # of places in plates, of which is asked whether they lie in a solid
 
 
 def closed_triangles(repaired: RepairedMesh, thickness: float) -> tuple[np.ndarray, np.ndarray]:
@@ -36,6 +40,31 @@ def thick_plates(triangles: np.ndarray, thickness: float) -> np.ndarray:
         a, b, c, d = front[:, k], front[:, (k + 1) % 3], back[:, (k + 1) % 3], back[:, k]
         parts += [np.stack([b, a, d], axis=1), np.stack([b, d, c], axis=1)]
     return np.concatenate(parts)
+
+
+def plates_outside(triangles: np.ndarray, thickness: float, solid: Surface) -> tuple[float, np.ndarray, np.ndarray] | None:
+    """Volume, centre and inertia per unit density, as ``integrate`` tells them, of what plates have outside of a solid.
+
+    From places at random, in pairs on both sides of the plates; None if all are outside.
+
+    Args:
+        triangles: middles of the plates, shape (n, 3, 3) [m].
+        thickness: of the plates [m].
+        solid: a closed surface.
+    """
+    skin, random = Skin(triangles), np.random.default_rng(0)
+    middle, normals = skin.sample(_PAIRS, random)
+    aside = thickness * random.uniform(0.0, 0.5, (_PAIRS, 1)) * normals
+    places = np.concatenate([middle - aside, middle + aside])
+    outside = np.abs(solid.winding(places)) < 0.5
+    if outside.all():
+        return None
+    one, places = thickness * float(skin.areas.sum()) / len(places), places[outside]
+    if not len(places):
+        return joined([])
+    centre = places.mean(axis=0)
+    spread = one * (places - centre).T @ (places - centre)
+    return one * len(places), centre, np.trace(spread) * np.eye(3) - spread
 
 
 def thicken(vertices: np.ndarray, faces: np.ndarray, thickness: float) -> tuple[np.ndarray, np.ndarray]:

@@ -79,11 +79,28 @@ def test_parts_far_apart_weigh_no_less_exactly(apart):
     assert centre == pytest.approx(np.array([1.0, 0.3, 0.1]) * apart * parts[1] / sum(parts), rel=1e-10)
 
 
-def test_a_sheet_that_lies_on_a_solid_leaves_it_a_mass():
-    sheet = trimesh.Trimesh([[-0.4, -0.4, 0.5], [0.4, -0.4, 0.5], [0.4, 0.4, 0.5], [-0.4, 0.4, 0.5]], [[0, 1, 2], [0, 2, 3]])
+@pytest.mark.parametrize(
+    ("edge", "height", "added"),
+    [
+        pytest.param(0.8, 0.5, 0.03, id="large on the solid"),
+        pytest.param(0.3, 0.5, 0.03, id="small on the solid"),
+        pytest.param(0.3, 0.51, 0.04, id="half sunk"),
+        pytest.param(0.3, 0.6, 0.06, id="apart"),
+    ],
+)
+def test_of_a_sheet_counts_what_is_outside_of_solids(edge, height, added):
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.5 * edge
+    sheet = trimesh.Trimesh(np.column_stack([corners, np.full(4, height)]), [[0, 1, 2], [0, 2, 3]])
     body = sample_body(trimesh.util.concatenate([trimesh.creation.box((1.0, 1.0, 1.0)), sheet]), 0.03, count=800)
-    assert body.volume == pytest.approx(1.0 + 0.03 * 0.8**2, rel=1e-3)
-    assert any("sheets overlap solids" in warning for warning in body.mass_warnings)
+    volume = added * edge**2
+    middle = 0.5 + added / 2.0 if added < 0.06 else height
+    assert body.volume == pytest.approx(1.0 + volume, abs=0.01 * volume)
+    assert body.centre == pytest.approx([0.0, 0.0, volume * middle / (1.0 + volume)], abs=0.01 * volume)
+    within = edge**2 + added**2, 2.0 * edge**2  # of the plate about its centre, over a twelfth of its volume
+    lever = middle**2 / (1.0 + volume)
+    expected = [1.0 / 6.0 + volume * (within[0] / 12.0 + lever)] * 2 + [1.0 / 6.0 + volume * within[1] / 12.0]
+    assert body.inertia == pytest.approx(np.diag(expected), abs=0.01 * volume)
+    assert any("sheets reach into solids" in warning for warning in body.mass_warnings) == (height < 0.6)
 
 
 @pytest.mark.parametrize("gap", [0.03, 0.06])
