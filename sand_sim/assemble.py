@@ -123,7 +123,7 @@ class Assembly:
     def safe_step(self, speed: float, depth: float) -> float:
         """The step [s] that would be safe at a top speed [m/s] and an overlap over radius [1]."""
         free = replace(self.light, solver=replace(self.light.solver, time_step=None))
-        spacings = [model.body.spacing for model in (*_rough(self.tools), *self.grounds)]
+        spacings = _rough_spacings(self.tools, self.grounds)
         return choose_time_step(free, self.smallest, max(speed, self.time_step.speed), spacings, max(depth, DEEP)).safe
 
 
@@ -169,7 +169,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         integrator=scene.solver.integrator,
         materials=len(_loose_materials(scene)) > 1,
         bodies=len(table.bodies) > 0,
-        smooth_tools=any(tool.smooth for tool in tools),
+        smooth_tools=any(one.smooth for one in (*tools, *grounds)),
         surfaces=kinds_of(walls),
         carry=_loses_digits(scene, time_step, precision),
     )
@@ -218,8 +218,8 @@ def build_solver(assembly: Assembly, setting: Setting, device, progress: Progres
         assembly.lattice,
         table,
         make_surfaces(assembly.walls, order, assembly.lattice, min(assembly.smallest.values()), assembly.plungers),
-        [_tool_body(tool, order) for tool in assembly.tools]
-        + [ToolBody(ground.body.points, ground.body.radius, order.index(ground.material)) for ground in assembly.grounds],
+        [_tool_body(tool, tool.tool.material, order) for tool in assembly.tools]
+        + [_tool_body(ground, ground.material, order) for ground in assembly.grounds],
         assembly.pair_table,
         device,
         assembly.plungers,
@@ -236,12 +236,12 @@ def _open_device(scene: Scene, spheres: int):
         raise SceneError(f"solver.device: {error}") from None
 
 
-def _rough(tools: list[ToolModel]) -> list[ToolModel]:
-    return [tool for tool in tools if not tool.smooth]
+def _rough_spacings(tools: list[ToolModel], grounds: list[Ground]) -> list[float]:
+    return [one.body.spacing for one in (*tools, *grounds) if not one.smooth]
 
 
-def _tool_body(tool: ToolModel, order: list[str]) -> ToolBody:
-    return ToolBody(tool.body.points, tool.body.radius, order.index(tool.tool.material), tool.surface)
+def _tool_body(model: ToolModel | Ground, material: str, order: list[str]) -> ToolBody:
+    return ToolBody(model.body.points, model.body.radius, order.index(material), model.surface)
 
 
 def _loose_materials(scene: Scene) -> set[str]:
@@ -266,7 +266,7 @@ def _time_step(
     """The step, shortened so that a whole number of steps makes a frame unless the scene gives it, and that number."""
     given = float(np.linalg.norm(table.velocity, axis=1).max())
     speed = fastest_speed(scene, _fall_height(scene, table, walls, grounds), given)
-    chosen = choose_time_step(scene, smallest, speed, [model.body.spacing for model in (*_rough(tools), *grounds)])
+    chosen = choose_time_step(scene, smallest, speed, _rough_spacings(tools, grounds))
     frame = 1.0 / scene.frame_rate
     if scene.solver.time_step is not None:
         return chosen, max(1, round(frame / chosen.value))

@@ -105,7 +105,7 @@ def find_fine_surfaces(assembly: Assembly) -> tuple[str, ...]:
 def _layers(assembly: Assembly) -> Iterator[tuple[str, str, float, float, str]]:
     """Spheres that make up surfaces: what they are called, their material, radius and spacing [m], and the field for it."""
     bodies = [(f"particles of tool '{one.tool.name}'", one.tool.material, one.body) for one in assembly.tools if not one.smooth]
-    bodies += [(f"particles of terrain '{ground.name}'", ground.material, ground.body) for ground in assembly.grounds]
+    bodies += [(f"particles of terrain '{one.name}'", one.material, one.body) for one in assembly.grounds if not one.smooth]
     for spheres, material, body in bodies:
         yield spheres, material, body.radius, body.spacing, "particle_radius"
     field = "rough.radius, and half the rough.spacing,"

@@ -106,7 +106,7 @@ def left_out(assembly: Assembly) -> dict[str, str]:
         "digits lost by velocities": None if recipe.carry else "what gravity and friction change in a step is large enough",
         "walls": None if assembly.walls else "the scene has no boundaries",
         "tools": None if scene.tools else "the scene has no tools",
-        "true surfaces of tools": None if recipe.smooth_tools else "no tool has contact 'smooth'",
+        "true surfaces of tools": None if recipe.smooth_tools else "no tool or terrain has contact 'smooth'",
         "settling": None if scene.settle.time > 0.0 else "settle.time is 0",
     }
     return {what: why for what, why in reasons.items() if why}

@@ -1,4 +1,4 @@
-"""Terrain: ground sampled into particles that never move, from a mesh or from a grid of heights."""
+"""Terrain: ground that never moves, from a mesh or from a grid of heights, as particles or as the surface itself."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +11,10 @@ from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_m
 from sampler.surface import Surface
 from sand_sim import rotation
 from sand_sim.scene.heights import read_heights
-from sand_sim.scene.types import Boundary, Pose, SceneError, Terrain
+from sand_sim.scene.types import SMOOTH, Boundary, Pose, SceneError, Terrain
+from sand_sim.true_surface import farthest, outward_triangles
+
+_DEPTH = 4.0  # of the solid below the lowest height of a smooth ground, in particle radii
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,7 @@ class Ground:
         place: world position of the frame that mesh and particles are in, whose axes are those of the world, shape (3,) [m].
         mesh: around the middle of its bounding box [m].
         body: its particles.
+        surface: what grains touch of a smooth one instead, shape (n, 3, 3) [m].
     """
 
     name: str
@@ -31,6 +35,7 @@ class Ground:
     place: np.ndarray
     mesh: trimesh.Trimesh
     body: ParticleBody
+    surface: np.ndarray | None = None
 
     @property
     def label(self) -> str:
@@ -44,15 +49,22 @@ class Ground:
 
     @property
     def extent(self) -> float:
-        """Farthest particle surface from the frame's origin [m]."""
-        return float(np.linalg.norm(self.body.points, axis=1).max() + self.body.radius)
+        """Farthest point of what grains touch from the frame's origin [m]."""
+        return farthest(self.body, self.surface)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether grains touch the surface itself."""
+        return self.surface is not None
 
     def distance(self, position: np.ndarray) -> np.ndarray:
-        """Distance of world points, shape (n, 3), from the particles' hull, shape (n,) [m].
+        """Distance of world points, shape (n, 3), from what grains touch, shape (n,) [m].
 
-        Positive outside a closed mesh, and on the side that the normals of an open one point to.
+        Positive outside a closed mesh, and on the side that the normals of a rough open one point to.
         """
         local = position - self.place
+        if self.smooth:
+            return SignedDistance(trimesh.Trimesh(**trimesh.triangles.to_kwargs(self.surface))).query(local)[0]
         if self.mesh.is_watertight:
             return SignedDistance(self.mesh).query(local)[0] - self.body.radius
         surface = Surface(np.asarray(self.mesh.triangles, float), "cpu")
@@ -79,21 +91,29 @@ def model_ground(boundary: Boundary, folder: Path, progress: Callable[[float], N
         if terrain.mesh:
             mesh = read_mesh(locate_mesh(terrain.mesh, folder), terrain.scale)
         else:
-            mesh = _sheet(read_heights(terrain.heights) * terrain.scale, terrain)
+            mesh = _relief(read_heights(terrain.heights) * terrain.scale, terrain)
         mesh.vertices = rotation.rotate(np.asarray(terrain.pose.orientation), mesh.vertices) + terrain.pose.position
         place = mesh.bounds.mean(axis=0)
         mesh.vertices = mesh.vertices - place
         body = sample_body(mesh, terrain.particle_radius, progress=progress)
     except (MeshError, SceneError) as error:
         raise SceneError(f"boundaries: {source} of terrain '{boundary.name}': {error}") from None
-    return Ground(boundary.name, boundary.material, place, mesh, body)
+    surface = outward_triangles(body.triangles) if terrain.contact == SMOOTH else None
+    return Ground(boundary.name, boundary.material, place, mesh, body, surface)
 
 
-def _sheet(heights: np.ndarray, terrain: Terrain) -> trimesh.Trimesh:
-    """Two triangles for each cell of the grid, facing up."""
+def _relief(heights: np.ndarray, terrain: Terrain) -> trimesh.Trimesh:
+    """Two triangles for each cell of the grid, facing up; below a smooth ground a solid, from which grains are driven upwards."""
     rows, columns = heights.shape
     y, x = np.mgrid[:rows, :columns] * terrain.spacing
     number = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = (corner.ravel() for corner in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]))
     faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
-    return trimesh.Trimesh(np.column_stack([x.ravel(), y.ravel(), heights.ravel()]), faces, process=False)
+    top = np.column_stack([x.ravel(), y.ravel(), heights.ravel()])
+    if terrain.contact != SMOOTH:
+        return trimesh.Trimesh(top, faces, process=False)
+    bottom = np.column_stack([top[:, :2], np.full(len(top), heights.min() - _DEPTH * terrain.particle_radius)])
+    rim = np.concatenate([number[0, :-1], number[:-1, -1], number[-1, :0:-1], number[:0:-1, 0]])
+    after, below = np.roll(rim, -1), len(top)
+    sides = [np.column_stack([rim, rim + below, after + below]), np.column_stack([rim, after + below, after])]
+    return trimesh.Trimesh(np.concatenate([top, bottom]), np.concatenate([faces, faces[:, ::-1] + below, *sides]), process=False)

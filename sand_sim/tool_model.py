@@ -8,14 +8,12 @@ import numpy as np
 import trimesh
 
 from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_mesh
-from sampler.surface import Surface
 from sand_sim import rotation
 from sand_sim.link_mesh import model_link
 from sand_sim.scene.types import SMOOTH, Scene, SceneError, Tool
+from sand_sim.true_surface import farthest, outward_triangles
 
 Progress = Callable[[str, float], None]
-
-_NEAR = 1e-5  # of the diagonal: where sides of a triangle are looked at
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,7 @@ class ToolModel:
     @property
     def extent(self) -> float:
         """Farthest point of its surface from the tool frame's origin [m]."""
-        points = self.body.points if self.surface is None else self.surface.reshape(-1, 3)
-        return float(np.linalg.norm(points, axis=1).max() + self.margin)
+        return farthest(self.body, self.surface)
 
     @property
     def box(self) -> tuple[np.ndarray, np.ndarray]:
@@ -106,15 +103,3 @@ def model_tool(tool: Tool, scene: Scene, grain: float | None, progress: Progress
     except MeshError as error:
         raise SceneError(f"tools.{tool.name}.{'link' if tool.link else 'mesh'}: {error}") from None
     return ToolModel(tool, mesh, body, outward_triangles(body.triangles) if tool.contact == SMOOTH else None)
-
-
-def outward_triangles(triangles: np.ndarray) -> np.ndarray:
-    """Triangles turned so that all look out of the solid; those of badly damaged meshes that have it on no side look both ways.
-
-    A grain just outside a triangle that looks the wrong way would be taken for one that is deep inside the tool.
-    """
-    around = Surface(triangles)
-    centres, step = triangles.mean(axis=1), _NEAR * around.unit * around.normals
-    solid_before, solid_behind = (np.abs(around.winding(centres + side * step)) > 0.5 for side in (1.0, -1.0))
-    turned = np.where((solid_before & ~solid_behind)[:, None, None], triangles[:, ::-1], triangles)
-    return np.concatenate([turned, triangles[~solid_before & ~solid_behind][:, ::-1]])

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from sand_sim.scene.fields import Field
 from sand_sim.scene.reading_poses import read_pose
-from sand_sim.scene.types import Boundary, Drive, Rough, Terrain, Vector
+from sand_sim.scene.types import ROUGH, SMOOTH, Boundary, Drive, Rough, Terrain, Vector
 
 _SIDES = ("left", "right", "front", "back", "bottom", "top")
 _LATTICES = ("triangular", "square")
@@ -26,7 +26,7 @@ _OPTIONAL = {
     "cone": ("height", "angle", "rough"),
     "hole_plate": ("rough",),
     "plunger": ("radius", "velocity", "force", "mass", "max_speed", "travel", "rough"),
-    "terrain": ("mesh", "heights", "spacing", "scale", "pose"),
+    "terrain": ("mesh", "heights", "spacing", "contact", "scale", "pose"),
 }
 FASTEST = 1e4  # [m/s] of plungers and tools: faster ones leave no time step
 _HEIGHT_FILES = (".npz", ".csv", ".png")
@@ -131,6 +131,7 @@ def _terrain(entry: Field, folder: Path) -> Terrain:
         raise entry.refuse("give exactly one of 'mesh' and 'heights', the file that the ground comes from")
     common = {
         "particle_radius": _length(entry["particle_radius"]),
+        "contact": entry.optional("contact", lambda f: f.choice((ROUGH, SMOOTH)), Terrain.contact),
         "scale": entry.optional("scale", lambda f: f.number(above=0.0), 1.0),
         "pose": entry.optional("pose", read_pose, Terrain.pose),
     }

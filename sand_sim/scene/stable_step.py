@@ -135,13 +135,14 @@ def network_steps(scene: Scene, smallest: dict[str, float], spacings: Sequence[f
     Args:
         scene: materials, pairs, boundaries, tools.
         smallest: smallest grain radius of each grain material [m].
-        spacings: of the particles of each rough tool, then of each terrain, in the order of the scene [m].
+        spacings: of the particles of each rough tool, then of each rough terrain, in the order of the scene [m].
         depth: overlap over radius up to which contacts shall be stable [1].
     """
     named = {m.name: m for m in scene.materials}
     rotation = scene.contact.rotation
     sampled = [(tool.material, tool.particle_radius) for tool in scene.tools if tool.contact != SMOOTH]
-    sampled += [(wall.material, wall.terrain.particle_radius) for wall in scene.boundaries if wall.terrain]
+    grounds = [(wall.material, wall.terrain) for wall in scene.boundaries if wall.terrain]
+    sampled += [(material, ground.particle_radius) for material, ground in grounds if ground.contact != SMOOTH]
     layers = [(*body, spacing) for body, spacing in zip(sampled, spacings, strict=True)]
     flat = [*scene.boundaries, *(tool for tool in scene.tools if tool.contact == SMOOTH)]
     layers += [(wall.material, wall.rough.radius, wall.rough.spacing) for wall in scene.boundaries if wall.rough]

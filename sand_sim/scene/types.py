@@ -105,12 +105,13 @@ class Drive:
 
 @dataclass(frozen=True)
 class Terrain:
-    """Ground made of particles sampled from a mesh or from a grid of heights, in the frame of ``pose``."""
+    """Ground made from a mesh or from a grid of heights, in the frame of ``pose``."""
 
     particle_radius: float  # [m]
     mesh: str = ""
     heights: Path | None = None
     spacing: float = 0.0  # [m] of the grid
+    contact: str = ROUGH  # or SMOOTH
     scale: float = 1.0  # [m per unit] of the mesh, or of the heights
     pose: Pose = Pose()
 

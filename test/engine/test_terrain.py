@@ -133,3 +133,54 @@ def test_coloured_pictures_and_missing_meshes_are_refused(make_ground, tmp_path)
         make_ground([[0, 0, 1]], {"heights": "ground.png"})
     with pytest.raises(SceneError, match=r"boundaries: mesh of terrain 'ground': mesh 'rock.stl': there is no file"):
         make_ground([[0, 0, 1]], {"mesh": "rock.stl", "spacing": None})
+
+
+def test_smooth_heights_are_where_they_are_said_to_be(make_ground, tmp_path):
+    """In a valley whose sides rise by a half a grain's centre rests ``R sqrt(1 + 1/2^2)`` above the bottom."""
+    x = np.arange(COLUMNS) * SPACING
+    np.savez(tmp_path / "valley.npz", heights=np.tile(0.03 + 0.5 * np.abs(x - 0.1), (ROWS, 1)))
+    rolling = {"contact": {"rolling": "spring"}, "numbers": {"rolling_friction": 0.1}}
+    world = make_ground([[0.1, 0.05, 0.03 + 1.2 * RADIUS]], {"heights": "valley.npz", "contact": "smooth"}, **rolling)
+    world.step(round(0.4 / world.time_step))
+    observation = world.observe()
+    steepness = np.hypot(1.0, 0.5)
+    assert observation.grains.position[0] == pytest.approx([0.1, 0.05, 0.03 + RADIUS * steepness], abs=1e-5)
+    assert observation.health.doubts == ()
+    weight = observation.grains.mass[0] * GRAVITY
+    assert observation.wall("ground").force == pytest.approx([0.0, 0.0, -weight], abs=1e-3 * weight)
+    ground = world.assembly.grounds[0]
+    assert ground.mesh.is_watertight
+    assert ground.mesh.volume == pytest.approx(0.2 * 0.1 * (4.0 * 0.003 + 0.5 * 0.05))  # down to four particle radii
+    at = np.array([[0.05, 0.05, 0.055 - 0.001], [0.05, 0.05, 0.055 + 0.001], [0.1, 0.05, 0.02]])
+    assert ground.distance(at) == pytest.approx([-0.001 / steepness, 0.001 / steepness, -0.002], abs=1e-6)
+
+
+def test_a_grain_slides_down_a_smooth_slope_as_down_a_plane(make_ground, tmp_path):
+    slope, time = 0.2, 0.1
+    np.savez(tmp_path / "slope.npz", heights=slope * SPACING * np.tile(np.arange(COLUMNS), (ROWS, 1)))
+    away = RADIUS * np.array([-slope, 0.0, 1.0]) / np.hypot(1.0, slope)
+    begin = np.array([0.15, 0.05, slope * 0.15]) + away
+    world = make_ground([begin], {"heights": "slope.npz", "contact": "smooth"}, contact={"tangential": "none"})
+    world.step(round(time / world.time_step))
+    fallen = 0.5 * GRAVITY * slope / (1.0 + slope**2) * world.time**2
+    expected = begin - fallen * np.array([1.0, 0.0, slope])
+    assert world.observe().grains.position[0] == pytest.approx(expected, abs=2e-3 * fallen)
+
+
+@pytest.mark.parametrize(("shape", "above"), [("block", 0.0), ("sheet", 0.002)])
+def test_smooth_mesh_terrain_is_as_large_as_its_mesh(make_ground, tmp_path, shape, above):
+    """A sheet is one particle radius thick on either side."""
+    import trimesh
+
+    block = trimesh.creation.box((0.06, 0.04, 0.02))
+    if shape == "sheet":
+        block.update_faces(np.asarray(block.triangles_center)[:, 2] > 0.009)
+    block.export(tmp_path / "block.stl")
+    terrain = {"mesh": "block.stl", "spacing": None, "particle_radius": 0.002, "contact": "smooth"}
+    on_top = [0.0, 0.0, 0.01 + above + RADIUS]
+    further = {"contact": {"rolling": "spring"}, "numbers": {"rolling_friction": 0.3}}
+    domain = {"low": [-0.1, -0.1, -0.1], "high": [0.1, 0.1, 0.1]}
+    world = make_ground([on_top], terrain, domain=domain, **further)
+    world.step(round(0.3 / world.time_step))
+    assert world.observe().grains.position[0] == pytest.approx(on_top, abs=1e-5)
+    assert world.observe().health.doubts == ()

@@ -12,7 +12,7 @@ from sampler.surface import Surface
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.smooth_tools import SmoothTools
 from sand_sim.engine.triangle_tree import TriangleTree, nearest_on_tree
-from sand_sim.tool_model import outward_triangles
+from sand_sim.true_surface import outward_triangles
 
 
 @kernel

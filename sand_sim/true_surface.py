@@ -1,0 +1,32 @@
+"""What grains touch of tools and terrains: the particles of rough ones, the triangles of smooth ones."""
+
+import numpy as np
+
+from sampler import ParticleBody
+from sampler.surface import Surface
+
+_NEAR = 1e-5  # of the diagonal: where sides of a triangle are looked at
+
+
+def farthest(body: ParticleBody, surface: np.ndarray | None) -> float:
+    """Farthest point of what grains touch from the origin [m].
+
+    Args:
+        body: the particles.
+        surface: of a smooth one, shape (n, 3, 3) [m], which counts instead.
+    """
+    if surface is not None:
+        return float(np.linalg.norm(surface.reshape(-1, 3), axis=1).max())
+    return float(np.linalg.norm(body.points, axis=1).max() + body.radius)
+
+
+def outward_triangles(triangles: np.ndarray) -> np.ndarray:
+    """Triangles turned so that all look out of the solid; those of badly damaged meshes that have it on no side look both ways.
+
+    A grain just outside a triangle that looks the wrong way would be taken for one that is deep inside the tool.
+    """
+    around = Surface(triangles)
+    centres, step = triangles.mean(axis=1), _NEAR * around.unit * around.normals
+    solid_before, solid_behind = (np.abs(around.winding(centres + side * step)) > 0.5 for side in (1.0, -1.0))
+    turned = np.where((solid_before & ~solid_behind)[:, None, None], triangles[:, ::-1], triangles)
+    return np.concatenate([turned, triangles[~solid_before & ~solid_behind][:, ::-1]])
