@@ -25,6 +25,7 @@ SPACING = 1.5  # default distance between neighbours in particle radii; below 2 
 _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest grain
 _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
+_NOTABLE = 0.01  # share of the volume that is not worth a warning
 _OPEN = 0.01  # openness of a surface from which its volume is counted, not integrated
 _WALL_SAMPLES = 4000
 _OUTWARD = 1e-5  # of the diagonal: how far out of its piece a particle is asked what is before it
@@ -259,9 +260,9 @@ def _mass(solid, around, free, parent, layers, plates, thickness, closed) -> tup
         prisms, outside = thick_plates(plates, thickness), plates_outside(plates, thickness, solid)
         corners = np.concatenate([corners, prisms.reshape(-1, 3)])
         parts.append(outside or integrate(prisms))
-        if outside:
-            warnings.append("sheets reach into solids, so what they add to volume and inertia is counted from places beside them")
     volume, centre, inertia = joined(parts)
+    if len(plates) and outside and outside[0] > _NOTABLE * volume:
+        warnings.append("sheets reach into solids, so what they add to volume and inertia is counted from places beside them")
     low, high = corners.min(axis=0), corners.max(axis=0)
     if is_physical(volume, centre, inertia, low, high):
         return volume, centre, inertia, warnings

@@ -100,7 +100,7 @@ def test_of_a_sheet_counts_what_is_outside_of_solids(edge, height, added):
     lever = middle**2 / (1.0 + volume)
     expected = [1.0 / 6.0 + volume * (within[0] / 12.0 + lever)] * 2 + [1.0 / 6.0 + volume * within[1] / 12.0]
     assert body.inertia == pytest.approx(np.diag(expected), abs=0.01 * volume)
-    assert any("sheets reach into solids" in warning for warning in body.mass_warnings) == (height < 0.6)
+    assert any("sheets reach into solids" in warning for warning in body.mass_warnings) == (edge > 0.5)  # 1 % of the whole
 
 
 @pytest.mark.parametrize("gap", [0.03, 0.06])
