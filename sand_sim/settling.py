@@ -26,8 +26,7 @@ def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> l
         SceneError: if the bed blows up.
     """
     told = _come_to_rest(assembly, doubts, progress) if assembly.scene.settle.time > 0.0 else []
-    _strike_off(assembly)
-    return told
+    return told + _strike_off(assembly)
 
 
 def _come_to_rest(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> list[str]:
@@ -56,13 +55,20 @@ def _come_to_rest(assembly: Assembly, doubts: tuple[str, ...], progress: Progres
     ]
 
 
-def _strike_off(assembly: Assembly) -> None:
-    """Take away what lies above the asked height of a fill."""
-    cloud, first = observe_grains(assembly), 0
+def _strike_off(assembly: Assembly) -> list[str]:
+    """Take away what lies above the asked height of a fill; told is where nothing comes near to it."""
+    cloud, first, told = observe_grains(assembly), 0, []
     for fill, number in zip(assembly.scene.fills, assembly.fill_numbers, strict=True):
         if fill.height is not None:
             own = (cloud.identity >= first) & (cloud.identity < first + number)
-            above = cloud.position[:, 2] + cloud.radius > fill.low[2] + fill.height
+            top = cloud.position[:, 2] + cloud.radius - fill.low[2]
+            above = top > fill.height
+            highest = float(top[own].max(initial=-np.inf))
+            if highest < fill.height - 2.0 * cloud.radius[own].max(initial=0.0):
+                told.append(
+                    f"fills: '{fill.name}' is only {highest:.3g} m high, not {fill.height:g} m; its grains pack densely or spread"
+                )
             gone = cloud.identity[own & above]
             assembly.solver.remove(np.flatnonzero(np.isin(assembly.grain_of_sphere, gone)))
         first += number
+    return told

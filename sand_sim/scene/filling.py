@@ -1,7 +1,7 @@
 """Where the grains of a fill start: loosely packed in their region, or as a file says."""
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -18,6 +18,8 @@ from sand_sim.scene.walls import Wall
 
 _GAP = 1.06  # lattice spacing over the largest diameter
 _JITTER = 0.4  # of the gap
+_FINEST = 4  # halvings of a place of the lattice
+_SPARE = 100  # places beyond what is needed, because chance deals them out
 _MOST_PLACES = 30_000_000  # in a region: 3 GB while they are laid out, and many times what a bed has been run with
 _POURED_FRACTION = 0.61  # of solid in a settled bed, a little high so that a fill by height can be struck off
 # What files of grains hold: arrays of an npz file, and the columns of a csv file that make them.
@@ -53,7 +55,8 @@ def fill_grains(
             turns = rotation.multiply(turns, rotation.from_matrix(shape.axes))
         return _table(position, radius, fill, material, index, shape, turns, **columns)
     random = np.random.default_rng(fill.seed)
-    largest = _largest(fill.size) * (shape.bounding_radius / shape.equal_radius if shape else 1.0)
+    reach = shape.bounding_radius / shape.equal_radius if shape else 1.0
+    largest = _largest(fill.size) * reach
     points = _lattice(fill, largest, random)
     places, taken = len(points), []
     obstacles = [(wall.label, partial(_clear, wall)) for wall in walls]
@@ -66,15 +69,16 @@ def fill_grains(
         taken.append((label, len(points) - clear.sum()))
         points = points[clear]
     wanted = fill.count or _count_for_height(fill, walls, random)
-    if wanted > len(points):
+    radius = _draw(fill.size, min(wanted, _MOST_PLACES), random)
+    position, room = _seat(points, radius * reach, largest, [is_clear for _, is_clear in obstacles], random)
+    if wanted > room:
         cause = "".join(f"; {what} takes {some} of its {places} places" for what, some in taken if 2 * some > places)
         raise SceneError(
-            f"fills: '{fill.name}' has room for {len(points)} loosely packed grains but {wanted} are wanted{cause}; "
+            f"fills: '{fill.name}' has room for {room} loosely packed grains but {wanted} are wanted{cause}; "
             "enlarge 'region' or ask for fewer grains"
         )
-    radius = _draw(fill.size, wanted, random)
     turns = rotation.at_random(wanted, random) if shape else None
-    return _table(points[:wanted], radius, fill, material, index, shape, turns)
+    return _table(position, radius, fill, material, index, shape, turns)
 
 
 def own_frames(fills: Iterable[Fill], tables: Iterable[GrainTable], bodies: int) -> np.ndarray:
@@ -172,6 +176,42 @@ def _lattice(fill: Fill, radius: float, random: np.random.Generator) -> np.ndarr
     slack = _JITTER * (spacing - 2.0 * radius)
     points += random.uniform(-slack, slack, points.shape)
     return np.clip(points, low + radius, high - radius)
+
+
+def _seat(
+    points: np.ndarray, radius: np.ndarray, largest: float, obstacles: Sequence[Callable], random: np.random.Generator
+) -> tuple[np.ndarray, int]:
+    """Where grains of some sizes go: a place of the lattice holds one, or eight of at most half the largest size, and so on.
+
+    Args:
+        points: places with room for the largest, lowest first, shape (m, 3) [m].
+        radius: that each grain reaches, shape (n,) [m].
+        largest: that they may reach [m].
+        obstacles: tell which points are clear of something, all of ``points`` are.
+        random: where chance comes from.
+
+    Returns:
+        Positions, shape (n, 3) [m], if there is room; for about how many like them there is.
+    """
+    level = np.clip(np.floor(np.log2(largest / radius)), 0, _FINEST).astype(int)
+    number = np.bincount(level)
+    if len(number) == 1:
+        return points[: len(radius)], len(points)
+    places = np.ceil(number / 8.0 ** np.arange(len(number)))  # that each size needs, mixed at random
+    points = points[: int(2.0 * places.sum()) + _SPARE]
+    kind = random.choice(len(number), len(points), p=places / places.sum())
+    position, share = np.zeros((len(radius), 3)), np.inf
+    for one in np.flatnonzero(number):
+        seats = points[kind == one]
+        for half in 0.5 ** np.arange(1, one + 1):
+            corner = half * largest * (2.0 * np.indices((2, 2, 2)).reshape(3, -1).T - 1.0)
+            seats = (seats[:, None] + corner).reshape(-1, 3)
+        for is_clear in obstacles if one else ():
+            seats = seats[is_clear(seats, largest / 2.0**one)]
+        share = min(share, len(seats) / number[one])
+        if share >= 1.0:
+            position[level == one] = seats[: number[one]]
+    return position, int(share * len(radius))
 
 
 def _even(count: int) -> np.ndarray:

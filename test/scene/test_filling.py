@@ -1,5 +1,7 @@
 """How grains get into a scene."""
 
+import re
+
 import numpy as np
 import pytest
 import yaml
@@ -55,6 +57,25 @@ def test_grains_keep_clear_of_walls():
     cylinder = Wall("cylinder", "pipe", "steel", np.array([0.1, 0.05, 0.0]), np.array([0.0, 0.0, 1.0]), 0.045)
     table = fill_grains(fill(count=100), SAND, 0, [cylinder])
     assert np.all(cylinder.distance(table.position) >= 0.005 * (1.0 - 1e-6))
+
+
+def test_fine_grains_among_coarse_ones_share_their_places():
+    """64 of a quarter of the size go where one of the largest does, mixed with them from the start, and none overlaps."""
+    pipe = Wall("cylinder", "pipe", "steel", np.array([0.1, 0.1, 0.0]), np.array([0.0, 0.0, 1.0]), 0.1)
+    size = SizeDistribution("table", radii=(0.00125, 0.0025, 0.005), weights=(8.0, 1.0, 1.0))
+    wide = {"size": size, "high": (0.2, 0.2, 0.12)}
+    table = fill_grains(fill(count=3000, **wide), SAND, 0, [pipe])
+    numbers = [np.count_nonzero(table.radius == radius) for radius in size.radii]
+    assert np.array(numbers) == pytest.approx([2400, 300, 300], abs=80)
+    gap = np.linalg.norm(table.position[:, None] - table.position[None], axis=2) - table.radius[:, None] - table.radius
+    assert gap[~np.eye(3000, dtype=bool)].min() >= -1e-9
+    assert np.all(pipe.distance(table.position) >= table.radius * (1.0 - 1e-6))
+    assert np.all(np.abs(table.position - [0.1, 0.1, 0.06]) <= np.array([0.1, 0.1, 0.06]) - table.radius[:, None] + 1e-12)
+    coarse, place = table.radius > 0.004, table.position
+    assert place[coarse].mean(axis=0) == pytest.approx(place[~coarse].mean(axis=0), abs=0.01)
+    assert place[:, 2].max() < 0.03  # some 380 places of 10.6 mm, 250 in a layer; 3000 would reach 0.12
+    with pytest.raises(SceneError, match=r"has room for \d{5} loosely packed grains but 10000000000000 are wanted"):
+        fill_grains(fill(count=10**13, **wide), SAND, 0, [pipe])
 
 
 @pytest.mark.parametrize("away", [0.0, 1e4])
@@ -127,6 +148,14 @@ def test_fills_keep_clear_of_those_before_them(tmp_path):
     assert nearest(np.concatenate([first.position, second.position])) > 0.01 * (1.0 - 1e-9)
     with pytest.raises(SceneError, match="fill 'bed' takes"):
         fill_grains(fill(count=800, seed=1), SAND, 0, [], [("bed", fill_grains(fill(count=1000), SAND, 0, []))])
+
+
+def test_a_bed_that_falls_short_of_its_height_is_told(tmp_path):
+    """Without walls it spreads."""
+    bed = {"name": "bed", "material": "grain", "radius": 0.005, "region": {"low": [0, 0, 0], "high": [0.05, 0.05, 0.3]}}
+    assert settled(tmp_path, [bed | {"count": 30}], floor()).warnings == []
+    told = settled(tmp_path, [bed | {"height": 0.1}], floor()).warnings[-1]
+    assert re.fullmatch(r"fills: 'bed' is only 0\.0\d+ m high, not 0.1 m; its grains pack densely or spread", told)
 
 
 def test_falling_grains_are_not_taken_for_resting_ones(tmp_path):
