@@ -102,6 +102,8 @@ def test_smooth_tools_are_left_out_where_all_are_rough(tmp_path):
     parsed = yaml.safe_load(path.read_text())
     rough = make_plan(assemble(read_scene(parsed, tmp_path)), measure=False)
     parsed["tools"]["plate"]["contact"] = "smooth"
+    ground = {"type": "terrain", "name": "ground", "material": "steel", "mesh": "plate.stl", "particle_radius": 0.01}
+    parsed["boundaries"].append(ground | {"pose": {"position": [0.0, 0.0, -0.02]}, "contact": "smooth"})
     smooth = make_plan(assemble(read_scene(parsed, tmp_path)), measure=False)
     assert {"touch_smooth", "carry_touch"} == set(smooth.kernels) - set(rough.kernels)
     assert set(rough.kernels) <= set(smooth.kernels) | {"put_back"}
@@ -110,6 +112,7 @@ def test_smooth_tools_are_left_out_where_all_are_rough(tmp_path):
     assert "true surfaces of tools" not in smooth.left_out
     assert rough.tools == {"plate": "rough"}
     assert smooth.tools == {"plate": "smooth"}
+    assert (rough.terrains, smooth.terrains) == ({}, {"ground": "smooth"})
 
 
 def test_clumps_are_counted_as_grains_and_spheres(tmp_path):

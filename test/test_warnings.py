@@ -48,10 +48,13 @@ def test_grains_that_have_not_come_to_rest_are_told(make_world):
     assert settled(1.0).warnings == []
 
 
-def test_a_run_tells_before_it_begins(tmp_path, capsys):
+def test_a_run_and_a_plan_tell_before_it_begins(tmp_path, capsys):
     path = write_small_scene(tmp_path, liquid=LIQUID, duration=0.02)
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
     assert "warning: liquid: has no effect" in capsys.readouterr().err
+    assert main(["plan", str(path), "--no-measure"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[lines.index("without effect") + 1].startswith("  liquid: has no effect")
 
 
 def test_a_world_refuses_a_velocity_and_says_what_it_takes(tmp_path):

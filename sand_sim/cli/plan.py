@@ -41,10 +41,12 @@ def plan_text(plan: Plan) -> str:
     """A plan to read."""
     lines = [f"{plan.grains:,} grains, {plan.spheres:,} spheres", "", "stages kept"]
     lines += [f"  {name:32} {when}" for name, when in plan.kept.items()]
-    lines += ["", "tools: what grains touch"] if plan.tools else []
-    lines += [f"  {name:32} {_TOUCHED[contact]}" for name, contact in plan.tools.items()]
+    for kind, touched in (("tools", plan.tools), ("terrains", plan.terrains)):
+        lines += ["", f"{kind}: what grains touch"] if touched else []
+        lines += [f"  {name:32} {_TOUCHED[contact]}" for name, contact in touched.items()]
     lines += ["", "meshes: what had to be mended or guessed"] if plan.meshes else []
     lines += [f"  {name:32} {what}" for name, told in plan.meshes.items() for what in told]
+    lines += ["", "without effect", *(f"  {what}" for what in plan.unused)] if plan.unused else []
     lines += ["", "left out: no code compiled, no memory taken"]
     lines += [f"  {name:32} {why}" for name, why in plan.left_out.items()]
     lines += ["", f"arrays: {plan.bytes_per_sphere:.0f} bytes per sphere, {sum(plan.arrays.values()) / 1e6:.1f} MB in all"]
