@@ -19,12 +19,14 @@ from sampler.rims import beyond_edges, beyond_layers
 from sampler.sheets import closed_triangles, plates_outside, thick_plates
 from sampler.skin import Skin, coinciding_layers, free_triangles, touchable_parts, winding_before
 from sampler.spreading import Observer, spread_particles
+from sampler.strips import with_rows
 from sampler.surface import Surface
 
 SPACING = 1.5  # default distance between neighbours in particle radii; below 2 so that particles overlap into a closed skin
 _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest grain
 _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
+_LOOSE = 1.1  # times what is to be expected of distance and coverage, from which strips are sought that have too few particles
 _NOTABLE = 0.01  # share of the volume that is not worth a warning
 _OPEN = 0.01  # openness of a surface from which its volume is counted, not integrated
 _WALL_SAMPLES = 4000
@@ -104,14 +106,13 @@ def sample_body(
         skin, thin = _inset_skin(inside, plates, radius, fine, count)
         settle = None
 
-    def spread(number: int, h: float) -> tuple[np.ndarray, np.ndarray]:
+    def spread(skin: Skin, number: int, h: float) -> tuple[np.ndarray, np.ndarray]:
         beyond = np.concatenate([beyond_edges(repaired.vertices, sheet, outer, h), beyond_layers(thin, skin, h)])
         move = partial(settle, spacing=h) if settle else lambda *placed: placed
         points, normals = spread_particles(skin, number, seed, progress, observe, move, beyond)
         return (inside.settle(points, radius, 0.2 * h) if inside else points), normals
 
-    area = float(skin.areas.sum())
-    points, normals, evenness, wanted = _spread_tight(spread, skin, radius, fine, count, grain)
+    points, normals, evenness, wanted, area = _spread_tight(spread, skin, radius, fine, count, grain)
     size = float(np.linalg.norm(np.ptp(repaired.triangles, axis=(0, 1))))  # of sheets, too
     uneven = broken_limits(evenness, len(points), wanted, radius, size)
     return ParticleBody(
@@ -133,17 +134,17 @@ def sample_body(
 
 
 def _spread_tight(
-    spread: Callable[[int, float], tuple[np.ndarray, np.ndarray]],
+    spread: Callable[[Skin, int, float], tuple[np.ndarray, np.ndarray]],
     skin: Skin,
     radius: float,
     spacing: float,
     count: int | None,
     grain: float | None,
-) -> tuple[np.ndarray, np.ndarray, Evenness, int]:
+) -> tuple[np.ndarray, np.ndarray, Evenness, int, float]:
     """Spread particles, ever more of them until no grain can pass, unless their number is given.
 
     Args:
-        spread: gives centres and normals for a number of particles and their spacing [m].
+        spread: gives centres and normals for a skin, a number of particles and their spacing [m].
         skin: where they lie.
         radius: of the particles [m].
         spacing: to begin with [m].
@@ -151,24 +152,33 @@ def _spread_tight(
         grain: radius of the smallest grain that must not pass [m], if there is one.
 
     Returns:
-        Centres, shape (n, 3) [m], and normals, shape (n, 3); how they lie; how many were wanted.
+        Centres, shape (n, 3) [m], and normals, shape (n, 3); how they lie; how many were wanted; the area that they share [m^2].
     """
-    area = float(skin.areas.sum())
     for attempt in range(_TRIES):
-        number = count if count is not None else particle_count(area, spacing)
-        if number > MOST:
-            raise too_many(area, number, radius)
-        points, normals = spread(number, lattice_spacing(area, number))
-        evenness = measure_evenness(skin, points, normals)
+        found = _spread_once(spread, skin, radius, spacing, count)
+        if not attempt and max(found[2].farthest, found[2].coverage / _COVERED) > _LOOSE:
+            rows = with_rows(skin, spacing if count is None else lattice_spacing(found[4], count))
+            if rows is not skin:
+                skin, found = rows, _spread_once(spread, rows, radius, spacing, count)
+        points, _, evenness, _, area = found
         coverage = evenness.coverage * lattice_spacing(area, len(points))
         if grain is None or coverage < radius + grain:
-            return points, normals, evenness, number
+            return found
         if count is not None or attempt == _TRIES - 1:
             raise MeshError(
                 f"a grain of radius {grain:.3g} m could pass: some places lie {coverage:.3g} m from the nearest "
                 f"particle of radius {radius:.3g} m; take more or larger particles"
             )
         spacing *= _FINER
+
+
+def _spread_once(spread, skin, radius, spacing, count) -> tuple[np.ndarray, np.ndarray, Evenness, int, float]:
+    area = float(skin.areas.sum())
+    number = count if count is not None else particle_count(area, spacing)
+    if number > MOST:
+        raise too_many(area, number, radius)
+    points, normals = spread(skin, number, lattice_spacing(area, number))
+    return points, normals, measure_evenness(skin, points, normals), number, area
 
 
 def _skin(free: np.ndarray, solid: Surface | None, spacing: float, device: str) -> Skin:

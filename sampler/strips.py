@@ -1,0 +1,103 @@
+"""Strips and wires far narrower than the spacing, which get fewer particles for their area than a row of them needs."""
+
+import numpy as np
+import warp as wp
+
+from sampler.cells import Cells, cell_at, row_of, sort_into_cells
+from sampler.launching import launch_shares
+from sampler.rows import ROW
+from sampler.skin import Skin, halve_triangles, longest_edges
+
+_PIECE = 0.5  # longest edge of pieces that are asked, in spacings
+_TOGETHER = 0.3  # width of cells whose pieces are asked together, in spacings
+_LEAST = 1.2  # times its area that a piece must want before it gets more
+
+
+@wp.kernel(enable_backward=False, module="sampler_cells")
+def gather_area(cells: Cells, areas: wp.array(dtype=float), first: int, total: wp.array(dtype=float), far: wp.array(dtype=float)):
+    """Area within a spacing of each place, and how far off the farthest of it is; everything by rank, in spacings."""
+    rank = first + wp.tid()
+    here = cells.points[rank]
+    low = cell_at(cells, here - wp.vec3(1.0))
+    high = cell_at(cells, here + wp.vec3(1.0))
+    area = float(0.0)
+    most = float(0.0)
+    for z in range(low[2], high[2] + 1):
+        for y in range(low[1], high[1] + 1):
+            row = row_of(cells, y, z)
+            for other in range(cells.begin[row + low[0]], cells.begin[row + high[0] + 1]):
+                way = wp.length(cells.points[other] - here)
+                if way < 1.0:
+                    area += areas[other]
+                    most = wp.max(most, way)
+    total[rank] = area
+    far[rank] = most
+
+
+@wp.kernel(enable_backward=False, module="sampler_cells")
+def widest_near(
+    cells: Cells,
+    total: wp.array(dtype=float),
+    far: wp.array(dtype=float),
+    first: int,
+    most: wp.array(dtype=float),
+    least: wp.array(dtype=float),
+):
+    """The most area around any place within a spacing, which tells rims of what is wide from strips, and the least extent."""
+    rank = first + wp.tid()
+    here = cells.points[rank]
+    low = cell_at(cells, here - wp.vec3(1.0))
+    high = cell_at(cells, here + wp.vec3(1.0))
+    area = total[rank]
+    extent = far[rank]
+    for z in range(low[2], high[2] + 1):
+        for y in range(low[1], high[1] + 1):
+            row = row_of(cells, y, z)
+            for other in range(cells.begin[row + low[0]], cells.begin[row + high[0] + 1]):
+                if wp.length(cells.points[other] - here) < 1.0:
+                    area = wp.max(area, total[other])
+                    extent = wp.min(extent, far[other])
+    most[rank] = area
+    least[rank] = extent
+
+
+def with_rows(skin: Skin, spacing: float) -> Skin:
+    """The skin, whose strips and wires count as wide as a row of particles; the same one if there are none.
+
+    Args:
+        skin: that particles are to cover.
+        spacing: of these [m].
+    """
+    parent, pieces, size = np.arange(len(skin.triangles)), skin.triangles, longest_edges(skin.triangles)
+    while np.any(large := size > _PIECE * spacing):
+        pieces = np.concatenate([pieces[~large], halve_triangles(pieces[large])])
+        parent = np.concatenate([parent[~large], np.tile(parent[large], 2)])
+        size = longest_edges(pieces)
+    own = Skin.areas_of(pieces)
+    area = own * (skin.areas / Skin.areas_of(skin.triangles))[parent]
+    places = pieces.mean(axis=1) / spacing
+    cell = np.floor(places / _TOGETHER).astype(np.int64)
+    cell -= cell.min(axis=0)
+    _, which = np.unique(np.ravel_multi_index(cell.T, cell.max(axis=0) + 1), return_inverse=True)
+    together = np.bincount(which, area)
+    middle = np.column_stack([np.bincount(which, area * places[:, k]) for k in range(3)]) / together[:, None]
+    middle = (middle - middle.mean(axis=0)).astype(np.float32)
+    wanted = _wanted(middle, together / spacing**2, skin.device)
+    share = np.bincount(parent, (area * wanted[which]), len(skin.triangles)) / np.bincount(parent, area, len(skin.triangles))
+    if np.all(share == 1.0):
+        return skin
+    return Skin(skin.triangles, skin.device, Skin.areas_of(skin.triangles) / (skin.areas * share))
+
+
+def _wanted(places: np.ndarray, areas: np.ndarray, device: str) -> np.ndarray:
+    """How many times its area each place is to count, shape (n,) [1]; in spacings."""
+    cells = sort_into_cells(places, np.zeros_like(places), 1.0, device)
+    order, number = cells.which.numpy(), len(places)
+    by_rank = wp.array(areas[order].astype(np.float32), dtype=float, device=device)
+    total, far, most, least = (wp.zeros(number, dtype=float, device=device) for _ in range(4))
+    launch_shares(gather_area, number, [cells, by_rank], [total, far], device)
+    launch_shares(widest_near, number, [cells, total, far], [most, least], device)
+    wanted = np.empty(number)
+    # A row of particles one spacing apart, one particle in what is shorter than that.
+    wanted[order] = ROW * np.maximum(1.0, 2.0 * least.numpy() + _TOGETHER) / most.numpy()
+    return np.where(wanted > _LEAST, wanted, 1.0)
