@@ -39,7 +39,7 @@ def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
     """Kernel that counts or, ``filling``, lists the surfaces and virtual spheres within reach of each grain."""
     precision, surfaces = recipe.precision, recipe.surfaces
     whole4, memory_vector = precision.whole4, memory_type(recipe.contact, precision)
-    from_anchor, nearest = build_from_anchor(precision, surfaces), build_nearest(surfaces)
+    from_anchor, nearest = build_from_anchor(precision, surfaces), build_nearest(surfaces, listing=True)
     rows_near, columns_near, (_, _, sphere_at) = build_rows_near(), build_columns_near(), build_sphere_at()
     rough, shell, note = ROUGH in surfaces, SHELL in surfaces, build_note(recipe, filling)
 

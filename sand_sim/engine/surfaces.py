@@ -48,10 +48,11 @@ class Surface:
 
 
 @cache
-def build_nearest_on_shell() -> wp.Function:
+def build_nearest_on_shell(listing: bool = False) -> wp.Function:
     """Warp function ``(wall, side, away) -> (distance [quantum], normal)`` for a shell.
 
-    Side 0 is the line in the grain's own half plane, side 1 that opposite, which a grain as wide as the hole touches, too.
+    Side 0 is the line in the grain's own half plane, side 1 that opposite, which a grain as wide as the hole touches, too. For
+    ``listing`` every shell answers at a seam, because the grain may be over the other one before lists are made anew.
     """
     zero, one, far = wp.float64(0.0), wp.float64(1.0), wp.float64(_FAR)
 
@@ -83,20 +84,21 @@ def build_nearest_on_shell() -> wp.Function:
         elif share >= one:
             answers = wall.answers_end
             beyond = wp.dot(apart, wall.beyond_end)
-        if beyond > zero or side >= answers:
-            distance = far
+        if wp.static(not listing):
+            if beyond > zero or side >= answers:
+                distance = far
         return distance, normal
 
     return nearest_on_shell
 
 
 @cache
-def build_nearest(surfaces: frozenset[str]) -> wp.Function:
+def build_nearest(surfaces: frozenset[str], listing: bool = False) -> wp.Function:
     """Warp function ``(wall, side, away) -> (distance [quantum], normal)`` for the smooth surfaces of a recipe.
 
-    ``away`` is from the anchor to the grain's centre [quantum]; only shells have a side 1.
+    ``away`` is from the anchor to the grain's centre [quantum]; only shells have a side 1. For ``listing`` see the shells.
     """
-    cylinder, shell, nearest_on_shell = CYLINDER in surfaces, SHELL in surfaces, build_nearest_on_shell()
+    cylinder, shell, nearest_on_shell = CYLINDER in surfaces, SHELL in surfaces, build_nearest_on_shell(listing)
 
     @wp.func
     def nearest(wall: Surface, side: int, away: wp.vec3d):
