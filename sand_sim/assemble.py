@@ -296,7 +296,7 @@ def _loses_digits(scene: Scene, time_step: TimeStep, precision: Precision) -> bo
     whole = float(np.linalg.norm(scene.gravity))
     allowed = [_ROUNDED * abs(along) for along in scene.gravity if abs(along) > _LEVEL * whole]
     numbers = {"friction", "rolling_friction"}.intersection(scene.contact.asks)
-    allowed += [_RESISTED * rule.numbers[name] * whole for rule in scene.pairs for name in numbers]
+    allowed += [_RESISTED * rule.numbers[name] * whole for rule in scene.pairs for name in numbers & rule.numbers.keys()]
     least = min((share for share in allowed if share > 0.0), default=np.inf)
     return 0.5 * precision.epsilon * time_step.speed > least * time_step.value
 

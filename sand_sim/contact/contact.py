@@ -33,6 +33,7 @@ def contact_type(precision: Precision) -> type:
         span: real  # [s] for how long they have grown, a step or the time since touch
         radius: real  # [m] effective radius R* = Ra Rb / (Ra + Rb)
         least: real  # [m] radius of the smaller body
+        lever: real  # [m] arm of rolling resistance, R*, on a surface the grain's radius, whatever particles that consists of
         mass: real  # [kg] effective mass m* = ma mb / (ma + mb)
         patch: real  # [m] radius of the Hertz contact patch, a = sqrt(R* xi), zero across a gap
         inertia: real  # [sqrt(kg m)] sqrt(m* a), shared by the damping of both directions

@@ -23,7 +23,7 @@ def build_meeting(precision: Precision) -> wp.Function:
 
     @wp.func
     def meeting(
-        normal: vec3, overlap: real, velocity: vec3, turning: vec3, radius: real, least: real, mass: real
+        normal: vec3, overlap: real, velocity: vec3, turning: vec3, radius: real, least: real, lever: real, mass: real
     ) -> contact_struct:
         contact = contact_struct()
         contact.normal = normal
@@ -35,6 +35,7 @@ def build_meeting(precision: Precision) -> wp.Function:
         contact.roll = turning
         contact.radius = radius
         contact.least = least
+        contact.lever = lever
         contact.mass = mass
         contact.patch = wp.sqrt(radius * wp.max(overlap, real(0.0)))
         contact.inertia = wp.sqrt(contact.patch * mass)

@@ -18,8 +18,9 @@ ROLLING_DAMPING = 0.3  # share of critical in the spring-dashpot law
 def build_constant(precision: Precision, types: ContactTypes) -> wp.Function:
     """Constant rolling torque against the rolling motion.
 
-    ``M = -mu_r R* F_n w / |w|`` with w the relative angular velocity in the tangent plane. It stops rolling grains; grains at
-    rest rattle under it, because its sign follows the smallest motion.
+    ``M = -mu_r R F_n w / |w|`` with w the relative angular velocity in the tangent plane, R being R* of two grains, and the
+    radius of one on a surface, also on one of particles. It stops rolling grains; grains at rest rattle under it, because its
+    sign follows the smallest motion, and on a slope creep down by about ``g dt``.
 
     Source: Zhou et al. 1999, https://doi.org/10.1016/S0378-4371(99)00183-1; model A of Ai et al. 2011,
     https://doi.org/10.1016/j.powtec.2010.09.030.
@@ -32,7 +33,7 @@ def build_constant(precision: Precision, types: ContactTypes) -> wp.Function:
         rate = wp.length(rolling)
         torque = real(0.0)
         if rate > real(0.0):
-            torque = -pair.rolling_friction * contact.radius * normal_force / rate
+            torque = -pair.rolling_friction * contact.lever * normal_force / rate
         return rolling * torque, memory
 
     return constant
@@ -41,8 +42,8 @@ def build_constant(precision: Precision, types: ContactTypes) -> wp.Function:
 def build_spring(precision: Precision, types: ContactTypes) -> wp.Function:
     """Elastic-plastic spring-dashpot against rolling (EPSD).
 
-    ``M = -k_r p - c_r w`` with the rolled angle p, ``k_r = 2.25 S (mu_r R*)^2`` (S = 2 E* a the normal tangent stiffness), c_r a
-    fixed share of critical, and ``|M| <= mu_r R* F_n``. A sphere rests on a slope up to ``tan(slope) = mu_r``.
+    ``M = -k_r p - c_r w`` with the rolled angle p, ``k_r = 2.25 S (mu_r R)^2`` (S = 2 E* a the normal tangent stiffness, R as in
+    the constant law), c_r a fixed share of critical, and ``|M| <= mu_r R F_n``. A sphere rests up to ``tan(slope) = mu_r``.
 
     Source: model C of Ai et al. 2011, https://doi.org/10.1016/j.powtec.2010.09.030, after Iwashita & Oda 1998.
     """
@@ -53,10 +54,10 @@ def build_spring(precision: Precision, types: ContactTypes) -> wp.Function:
     def spring(contact: types.contact, pair: types.pair, normal_force: real, memory: vec3):
         rolling = contact.turning - contact.normal * wp.dot(contact.turning, contact.normal)
         # Moments over the arm, because squares of moments of grains below a micrometre are zero in single precision.
-        arm = pair.rolling_friction * contact.radius
+        arm = pair.rolling_friction * contact.lever
         line = real(2.25) * pair.rolling_young * contact.patch
         # 7/5 m r^2 is the inertia of a sphere about its contact point.
-        critical = real(2.0) * contact.least * wp.sqrt(line * (real(7.0) / real(5.0) * contact.mass))
+        critical = real(2.0) * wp.max(contact.least, contact.lever) * wp.sqrt(line * (real(7.0) / real(5.0) * contact.mass))
         viscous = rolling * (real(wp.static(damping)) * critical)
         over = contact.roll - contact.normal * wp.dot(contact.roll, contact.normal)
         rolled = turned(memory, contact.normal) + over * contact.span
@@ -72,7 +73,7 @@ def build_spring_energy(precision: Precision, types: ContactTypes) -> wp.Functio
 
     @wp.func
     def spring_energy(contact: types.contact, pair: types.pair, rolled: vec3) -> real:
-        arm = pair.rolling_friction * contact.radius
+        arm = pair.rolling_friction * contact.lever
         return real(1.125) * arm * arm * pair.rolling_young * contact.patch * wp.dot(rolled, rolled)
 
     return spring_energy

@@ -75,7 +75,7 @@ def build_act(recipe: Recipe, measuring: bool) -> tuple[wp.Function, wp.Function
             if wp.static(lagging):
                 # Velocities are those of the middle of the last step; energies add up if the overlap is taken there, too.
                 overlap = met.overlap + real(0.5) * dt * met.normal_speed
-                stored_in = meeting(met.normal, overlap, met.slip, met.turning, met.radius, met.least, met.mass)
+                stored_in = meeting(met.normal, overlap, met.slip, met.turning, met.radius, met.least, met.lever, met.mass)
             energy[contact] = stored_energy(stored_in, pair, after)
         elif wp.static(history):
             memory[contact] = after

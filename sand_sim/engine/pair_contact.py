@@ -96,7 +96,7 @@ def build_pair_contact(recipe: Recipe) -> wp.Function:
             slip -= wp.cross(spin_a * (radius_a - half) + spin_b * (radius_b - half), normal)
         radius = radius_a * radius_b / (span * quantum)
         mass = mass_a * mass_b / (mass_a + mass_b)
-        met = meeting(normal, overlap, slip, spin_a - spin_b, radius, wp.min(radius_a, radius_b), mass)
+        met = meeting(normal, overlap, slip, spin_a - spin_b, radius, wp.min(radius_a, radius_b), radius, mass)
         if wp.static(springs):
             if wp.static(not halves):
                 past = velocity

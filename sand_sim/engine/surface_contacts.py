@@ -216,7 +216,7 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     spin_i = spin[i]
                     turning = vec3(spin_i[0], spin_i[1], spin_i[2])
                     velocity -= wp.cross(turning, normal) * (radius - share * overlap)
-                met = meeting(normal, overlap, velocity, turning, law_radius, least, mass)
+                met = meeting(normal, overlap, velocity, turning, law_radius, least, radius, mass)
                 if wp.static(springs):
                     past = vec3(of_i[0], of_i[1], of_i[2]) - of_wall
                     turned = turning

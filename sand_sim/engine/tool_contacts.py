@@ -222,7 +222,7 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     spin_i = vec3(spin[i][0], spin[i][1], spin[i][2])
                     turning += spin_i
                     velocity -= wp.cross(spin_i, normal) * (radius - half)
-                met = meeting(normal, overlap, velocity, turning, law_radius, least, of_i[3])
+                met = meeting(normal, overlap, velocity, turning, law_radius, least, radius, of_i[3])
                 if wp.static(springs):
                     past = vec3(of_i[0], of_i[1], of_i[2])
                     turned = vec3(spin[i][0], spin[i][1], spin[i][2])

@@ -18,10 +18,10 @@ def effective_shear(a: Material, b: Material) -> float:
 
 
 def pair_numbers(scene: Scene, a: str, b: str) -> PairNumbers | None:
-    """All numbers of two materials by their names; None if the scene has no rule for them, because they never meet."""
+    """All numbers of two materials by their names; None if the scene lacks a rule or a number, because they never meet."""
     one, other = (scene.materials[scene.material_index(name)] for name in (a, b))
     rules = [rule for rule in scene.pairs if set(rule.between) == {a, b}]
-    if not rules:
+    if not rules or not set(scene.contact.asks) <= rules[0].numbers.keys():
         return None
     liquid = asdict(scene.liquid) if scene.liquid else {}
     return PairNumbers(effective_young(one, other), effective_shear(one, other), rules[0].numbers, liquid)

@@ -50,7 +50,7 @@ def rolling_spring(
         radius: effective, R* [m].
         mass: effective [kg].
         overlap: at which the stiffness is taken [m].
-        arm: R*/r, at most one [1].
+        arm: R*/r, one on a surface [1].
     """
     if model.rolling != "spring":
         return 0.0, 0.0

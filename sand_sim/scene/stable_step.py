@@ -95,7 +95,7 @@ def turning_spring(
         grain: radius of the grain [m].
         fixed: whether the other body is an immovable surface.
     """
-    stiffness, damping = rolling_spring(model, pair, radius, mass, overlap, arm=radius / grain)
+    stiffness, damping = rolling_spring(model, pair, radius, mass, overlap, arm=1.0 if fixed else radius / grain)
     if stiffness > 0.0 and fixed:
         across, drag = friction_spring(model, pair, radius, mass, overlap)
         return stiffness + across, damping + drag

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 from scenes import floor, record
 
 RADIUS, YOUNG, POISSON, DENSITY, GRAVITY = 0.005, 1e7, 0.3, 2500.0, 9.81
@@ -140,3 +141,42 @@ def test_twisting_stops_a_spinning_top(make_world):
     assert halfway == pytest.approx(0.5 * spin, rel=1e-2)
     assert np.abs(rate[-1]) < 0.2 * spin  # what the twisted patch gives back
     assert np.abs(history["velocity"]).max() < 1e-6
+
+
+@pytest.mark.parametrize("particle", [0.001, 0.0004])
+@pytest.mark.parametrize("surface", ["wall", "tool"])
+def test_surfaces_of_particles_resist_rolling_as_flat_ones(make_world, tmp_path, surface, particle):
+    """However fine the particles are; those hold a grain on slopes of a few hundredths by themselves."""
+    friction = 0.3
+
+    def moved(slope):
+        further = {"boundaries": floor()}
+        if surface == "wall":
+            further["boundaries"][0]["rough"] = {"radius": particle, "spacing": 1.2 * particle}
+        else:
+            trimesh.creation.box((0.04, 0.04, 0.01)).export(tmp_path / "plate.stl")
+            plate = {
+                "mesh": "plate.stl",
+                "material": "wall",
+                "particle_radius": particle,
+                "pose": {"position": [0.0, 0.0, -0.005]},
+            }
+            further = {"tools": {"plate": plate}}
+        world = make_world(
+            [[0.0, 0.0, RADIUS + particle]],
+            RADIUS,
+            material=MATERIAL,
+            gravity=[GRAVITY * np.sin(slope), 0.0, -GRAVITY * np.cos(slope)],
+            domain={"low": [-0.1] * 3, "high": [0.1] * 3},
+            contact={"rolling": "spring"},
+            threads=1,
+            numbers={"friction": 1.0, "rolling_friction": friction},
+            **further,
+        )
+        world.step(round(0.3 / world.time_step))  # into a dimple
+        early = world.observe().grains.position[0, 0]
+        world.step(round(0.1 / world.time_step))
+        return world.observe().grains.position[0, 0] - early
+
+    assert abs(moved(np.arctan(friction - 0.01))) < 1e-4 * RADIUS
+    assert moved(np.arctan(friction + 0.08)) > RADIUS

@@ -178,3 +178,15 @@ def test_own_scenes_are_good(path):
 def test_a_scene_that_was_changed_in_python_is_checked_again(tmp_path, change, named):
     with pytest.raises(SceneError, match=named):
         World(replace(load_scene(write_small_scene(tmp_path)), **change))
+
+
+def test_a_pair_that_nothing_needs_may_lack_numbers(tmp_path):
+    """A steel that nothing is made of, with a rule from another scene; the world is made and steps."""
+    parsed = changed(("tools",), None)
+    parsed["materials"]["ice"] = parsed["materials"]["steel"]
+    parsed["pairs"] += [{"between": ["sand", "ice"], "restitution": 0.5}, {"between": ["ice", "ice"]}]
+    for pair in parsed["pairs"][:2]:
+        pair["rolling_friction"] = 0.1
+    world = World(read_scene(parsed | {"contact": {"rolling": "spring"}}, tmp_path))
+    world.step(1)
+    assert world.steps == 1
