@@ -21,7 +21,7 @@ from sand_sim.scene.checking import check_scene, unused_numbers
 from sand_sim.scene.filling import fill_grains, own_frames, smallest_of_materials, smallest_sphere
 from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.stable_step import DEEP
-from sand_sim.scene.time_step import TimeStep, choose_time_step, fastest_speed
+from sand_sim.scene.time_step import TimeStep, choose_time_step, fastest_speed, loses_digits
 from sand_sim.scene.types import Scene, SceneError
 from sand_sim.scene.walls import Wall, walls_of
 from sand_sim.surfacing import kinds_of, make_plungers, make_surfaces
@@ -30,9 +30,7 @@ from sand_sim.tool_model import Progress, ToolModel, model_tool
 
 _SKIN = 0.25  # of the mean grain radius
 _SPHERES_PER_THREAD = 1000
-_ROUNDED = 1e-3  # of what gravity gives, that rounding may take off or add, before what it does is carried over
-_RESISTED = 5e-3  # the same of what friction or rolling resistance takes
-_LEVEL = 1e-6  # of gravity: less of it along an axis is none
+_CROWDED = 2  # threads per core at most, enough to try whether results depend on their number
 _FLOOR = 0.05  # a plane whose normal points up by at least this much is a floor
 
 
@@ -118,7 +116,10 @@ class Assembly:
     def warnings(self) -> list[str]:
         """What the user should know before the run."""
         meshes = [f"{label}: {text}" for label, texts in self.mesh_warnings.items() for text in texts]
-        return [*filter(None, [self.time_step.warning]), *unused_numbers(self.scene), *meshes]
+        threads, cores = self.scene.solver.threads or 0, available_cores()
+        waiting = f"solver.threads: {threads} on {cores} cores wait for one another; ask for at most {cores}"
+        told = [self.time_step.warning, waiting if threads > cores else ""]
+        return [*filter(None, told), *unused_numbers(self.scene), *meshes]
 
     def safe_step(self, speed: float, depth: float) -> float:
         """The step [s] that would be safe at a top speed [m/s] and an overlap over radius [1]."""
@@ -171,7 +172,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         bodies=len(table.bodies) > 0,
         smooth_tools=any(one.smooth for one in (*tools, *grounds)),
         surfaces=kinds_of(walls),
-        carry=_loses_digits(scene, time_step, precision),
+        carry=loses_digits(scene, time_step, precision),
     )
     mean = float(table.radius.mean())
     skin, radius = (scene.solver.skin, 0.0) if scene.solver.skin else (_SKIN * mean, mean)
@@ -228,8 +229,12 @@ def build_solver(assembly: Assembly, setting: Setting, device, progress: Progres
 
 
 def _open_device(scene: Scene, spheres: int):
-    """The scene's device; a small scene gets few threads, because they would wait for each other longer than they work."""
-    threads = scene.solver.threads or min(available_cores(), 1 + spheres // _SPHERES_PER_THREAD)
+    """The scene's device; a small scene gets few threads, because they would wait for each other longer than they work.
+
+    Far more than there are cores would all but stand still.
+    """
+    cores = available_cores()
+    threads = min(scene.solver.threads or min(cores, 1 + spheres // _SPHERES_PER_THREAD), _CROWDED * cores)
     try:
         return open_device(scene.solver.device, threads)
     except ValueError as error:
@@ -286,19 +291,6 @@ def _fall_height(scene: Scene, table: GrainTable, walls: list[Wall], grounds: li
     boxes = [wall.corners for wall in walls if wall.kind == "shell"] + [ground.mesh.bounds + ground.place for ground in grounds]
     heights += [float(np.maximum(*(box * down)).sum()) - highest for box in boxes]
     return max(heights)
-
-
-def _loses_digits(scene: Scene, time_step: TimeStep, precision: Precision) -> bool:
-    """Whether rounding the fastest velocity to expect may change it by a notable share of the least that it gains in a step.
-
-    That is what gravity gives along an axis, or what friction or rolling resistance takes from a grain that it presses down.
-    """
-    whole = float(np.linalg.norm(scene.gravity))
-    allowed = [_ROUNDED * abs(along) for along in scene.gravity if abs(along) > _LEVEL * whole]
-    numbers = {"friction", "rolling_friction"}.intersection(scene.contact.asks)
-    allowed += [_RESISTED * rule.numbers[name] * whole for rule in scene.pairs for name in numbers & rule.numbers.keys()]
-    least = min((share for share in allowed if share > 0.0), default=np.inf)
-    return 0.5 * precision.epsilon * time_step.speed > least * time_step.value
 
 
 def _pair_table(scene: Scene, order: list[str], precision: Precision) -> list[list]:

@@ -16,6 +16,18 @@ def frame_times(scene: Scene, duration: float | None = None) -> Iterator[float]:
         yield (k + 1) / scene.frame_rate
 
 
+def driven_tools(scene: Scene) -> list[str]:
+    """Names of the tools with a trajectory.
+
+    Raises:
+        SceneError: if there are none.
+    """
+    driven = [tool.name for tool in scene.tools if tool.trajectory]
+    if not driven:
+        raise SceneError(f"scene '{scene.name}' has no tool with a trajectory, so there is nothing to play")
+    return driven
+
+
 def commands_at(scene: Scene, time: float) -> list[ToolPose]:
     """Poses that the tools with a trajectory have at a time [s]."""
     driven = [tool for tool in scene.tools if tool.trajectory]

@@ -20,12 +20,22 @@ def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> l
         progress: called with the name of the stage and the share of it that is done, 0 to 1.
 
     Returns:
-        What the user should know: that the grains have not come to rest.
+        What the user should know: that grains have not come to rest, have left, or do not come up to the height of their fill.
 
     Raises:
-        SceneError: if the bed blows up.
+        SceneError: if the bed blows up, or all grains leave.
     """
-    told = _come_to_rest(assembly, doubts, progress) if assembly.scene.settle.time > 0.0 else []
+    if assembly.scene.settle.time > 0.0:
+        told = _come_to_rest(assembly, doubts, progress)
+        left = assembly.table.grains - len(observe_grains(assembly))
+        if left:
+            told.append(
+                f"settle: {left} of {assembly.table.grains} grains left the domain while they settled; close the boundaries or "
+                "enlarge 'domain'"
+            )
+    else:
+        early = [f"'{fill.name}'" for fill in assembly.scene.fills if fill.height is not None and any(assembly.scene.gravity)]
+        told = [f"fills: {name} is struck off at its 'height' before it settles; give 'settle' a time" for name in early]
     return told + _strike_off(assembly)
 
 
@@ -43,6 +53,8 @@ def _come_to_rest(assembly: Assembly, doubts: tuple[str, ...], progress: Progres
             raise SceneError(f"settle: the bed blows up while it settles: {error}; {why}") from None
         assembly.solver.measure()
         cloud = observe_grains(assembly)
+        if not len(cloud):
+            raise SceneError("settle: all grains have left the domain; give the scene a floor and walls, or a larger 'domain'")
         speed = np.sqrt(np.sum(cloud.mass * cloud.speed**2) / np.sum(cloud.mass))
         progress("settling", (done + 1) / _CHUNKS)
         slow = slow + chunk * step if speed < asked.speed else 0.0

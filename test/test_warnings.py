@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scenes import floor, write_small_scene
 
-from sand_sim import CommandError, World, load_scene
+from sand_sim import CommandError, SceneError, World, load_scene
 from sand_sim.border import ToolVelocity
 from sand_sim.cli.main import main
+from sand_sim.engine.lanes import available_cores
 
 LIQUID = {"bridge_volume": 0.01}
 
@@ -48,6 +49,26 @@ def test_grains_that_have_not_come_to_rest_are_told(make_world):
     assert settled(1.0).warnings == []
 
 
+def test_grains_that_leave_while_they_settle_are_told(make_world):
+    further = {"gravity": [0.0, 0.0, -9.81], "restitution": 0.3, "settle": {"time": 0.5, "speed": 0.01}}
+    further |= {"domain": {"low": [-0.1, -0.1, -0.1], "high": [0.3, 0.1, 0.1]}}
+    disc = {"type": "hole_plate", "name": "disc", "material": "wall", "point": [0.0] * 3, "normal": [0.0, 0.0, 1.0]}
+    disc |= {"hole_radius": 0.0, "radius": 0.02}
+    places = [[0.0, 0.0, 0.005], [0.1, 0.0, 0.005], [0.2, 0.0, 0.005]]
+    world = make_world(places, 0.005, boundaries=[disc], **further)
+    assert world.warnings[0].startswith("settle: 2 of 3 grains left the domain while they settled; close the boundaries")
+    assert len(world.observe().grains) == 1
+    with pytest.raises(SceneError, match="settle: all grains have left the domain; give the scene a floor"):
+        make_world(places[1:], 0.005, boundaries=[disc], **further)
+
+
+def test_a_bed_struck_off_before_it_settles_is_told(tmp_path):
+    region = {"low": [0.0, 0.0, 0.0], "high": [0.06, 0.06, 0.2]}
+    bed = {"name": "bed", "material": "sand", "radius": 0.005, "region": region, "height": 0.03}
+    world = World(load_scene(write_small_scene(tmp_path, fills=[bed], tools={})))
+    assert world.warnings == ["fills: 'bed' is struck off at its 'height' before it settles; give 'settle' a time"]
+
+
 def test_a_run_and_a_plan_tell_before_it_begins(tmp_path, capsys):
     path = write_small_scene(tmp_path, liquid=LIQUID, duration=0.02)
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
@@ -64,3 +85,20 @@ def test_a_world_refuses_a_velocity_and_says_what_it_takes(tmp_path):
         world.apply(velocity)
     world.apply(world.pose_after(velocity, 0.1))
     assert world.arrival("plate") > 0.0
+
+
+def test_more_threads_than_cores_are_told_and_not_all_started(make_world):
+    cores = available_cores()
+    world = make_world([[0.0, 0.0, 0.0]], 0.005, threads=1000)
+    assert world.assembly.solver.device.lanes == 2 * cores
+    assert world.warnings == [f"solver.threads: 1000 on {cores} cores wait for one another; ask for at most {cores}"]
+    assert make_world([[0.0, 0.0, 0.0]], 0.005, threads=1).warnings == []
+
+
+@pytest.mark.parametrize(("quota", "cores"), [("max 100000", 4), ("250000 100000", 2), ("20000 100000", 1), (None, 4), ("", 4)])
+def test_a_container_has_the_cores_that_its_share_is_worth(tmp_path, monkeypatch, quota, cores):
+    if quota is not None:
+        (tmp_path / "cpu.max").write_text(quota)
+    monkeypatch.setattr("sand_sim.engine.lanes._QUOTA", tmp_path / "cpu.max")
+    monkeypatch.setattr("os.sched_getaffinity", lambda process: range(4))
+    assert available_cores() == cores

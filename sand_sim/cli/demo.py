@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sand_sim.config_folder import find_scene
 from sand_sim.interruption import Interruption
+from sand_sim.playing import driven_tools
 from sand_sim.report import summary_text
 from sand_sim.scene.reading import load_scene
 
@@ -26,6 +27,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb."""
     path = find_scene(options.scene)
     scene = load_scene(path)
+    driven_tools(scene)  # or nothing would come of it
     options.out.mkdir(parents=True, exist_ok=True)  # now, not when all has been done
     parameters = {
         "scene": str(path),
@@ -37,12 +39,14 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         "view": options.view,
     }
     assignments = [word for name, value in parameters.items() for word in ("-p", f"{name}:={json.dumps(value)}")]
-    # The demo talks to itself only, whatever else runs on the network.
+    # The demo talks to itself only, whatever else runs on the network, or on this machine.
+    own = f"demo_{os.getpid()}"
+    assignments += ["-r", f"__ns:=/{own}", "-r", f"/clock:=/{own}/clock"]
     environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **os.environ}
     summary = options.out / f"{scene.name}.json"
     summary.unlink(missing_ok=True)
     node = _start(["-m", "sand_sim.node", "--ros-args", *assignments], environment)
-    client = _start(["-m", "sand_sim", "play", str(path)], environment)
+    client = _start(["-m", "sand_sim", "play", str(path), "--node", f"{own}/sand_sim", "--clock", f"/{own}/clock"], environment)
     while node.poll() is None and not client.poll():  # for a client that has failed the node would wait for ever
         try:
             node.wait(0.2)

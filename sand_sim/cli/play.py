@@ -12,6 +12,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("scene", help="scene file, or the name of one of the package's own, such as dig")
     parser.add_argument("--node", default="sand_sim", help="name of the node, after its namespace if it has one")
+    parser.add_argument("--clock", default="/clock", help="topic on which the node tells simulated time")
     parser.add_argument("--frame-id", default="", help="frame that the poses are in (default: the node's world frame)")
 
 
@@ -22,4 +23,4 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         from sand_sim.node.player import play
     except ModuleNotFoundError as error:
         raise SceneError(f"'play' needs ROS 2, and {error.name} cannot be imported; try 'run', which does not") from None
-    return play(scene, options.node.strip("/"), options.frame_id, interruption)
+    return play(scene, options.node.strip("/"), options.frame_id, options.clock, interruption)

@@ -14,20 +14,21 @@ from rosgraph_msgs.msg import Clock
 from msg_adapters.builtin_interfaces import stamp_to_time
 from msg_adapters.geometry_msgs import command_to_pose
 from sand_sim.interruption import Interruption
-from sand_sim.playing import commands_at, frame_times
+from sand_sim.playing import commands_at, driven_tools, frame_times
 from sand_sim.scene.types import Scene, SceneError
 
 _AHEAD = 0.2  # [s] of simulated time by which poses are sent before they are due
 _PATIENCE = 3.0  # [s] of waiting after which it is told what for
 
 
-def play(scene: Scene, target: str, frame_id: str, interruption: Interruption) -> int:
+def play(scene: Scene, target: str, frame_id: str, clock_topic: str, interruption: Interruption) -> int:
     """Send all poses of a scene's trajectories, stamped with simulated time.
 
     Args:
         scene: with trajectories.
         target: name of the node, which is waited for.
         frame_id: frame that the poses are in; empty for the one in which the node tells where its tools are.
+        clock_topic: where simulated time is told.
         interruption: the user's wish to stop.
 
     Returns:
@@ -37,13 +38,12 @@ def play(scene: Scene, target: str, frame_id: str, interruption: Interruption) -
         SceneError: if there is nothing to play, no node can have that name, simulated time is past all of it, or the node has
             gone before the end.
     """
-    driven = [tool.name for tool in scene.tools if tool.trajectory]
-    if not driven:
-        raise SceneError(f"scene '{scene.name}' has no tool with a trajectory, so there is nothing to play")
-    try:
-        validate_full_topic_name(f"/{target}")
-    except NameValidationException as error:
-        raise SceneError(f"--node '{target}': {' '.join(str(error).split())}") from None
+    driven = driven_tools(scene)
+    for option, name in (("--node", f"/{target}"), ("--clock", clock_topic)):
+        try:
+            validate_full_topic_name(name)
+        except NameValidationException as error:
+            raise SceneError(f"{option} '{name}': {' '.join(str(error).split())}") from None
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("sand_sim_player")
     try:
@@ -55,7 +55,7 @@ def play(scene: Scene, target: str, frame_id: str, interruption: Interruption) -
         def hear_pose(message: PoseStamped) -> None:
             frame[0] = frame[0] or message.header.frame_id
 
-        node.create_subscription(Clock, "/clock", hear, 10)
+        node.create_subscription(Clock, clock_topic, hear, 10)
         node.create_subscription(PoseStamped, f"/{target}/tools/{driven[0]}/pose_actual", hear_pose, 10)
         publishers = {
             name: node.create_publisher(PoseStamped, f"/{target}/tools/{name}/pose", QoSProfile(depth=100)) for name in driven
@@ -71,7 +71,10 @@ def play(scene: Scene, target: str, frame_id: str, interruption: Interruption) -
                 if not begun:
                     if time.monotonic() > told_at:
                         told_at = float("inf")
-                        print(f"sand_sim: waiting for node '{target}': {_missing(target, publishers, clock[0])}", file=sys.stderr)
+                        print(
+                            f"sand_sim: waiting for node '{target}': {_missing(target, publishers, clock[0], clock_topic)}",
+                            file=sys.stderr,
+                        )
                     continue
                 if clock[0] > scene.duration - 0.5 / scene.frame_rate:
                     raise SceneError(_past(scene, target, clock[0]))
@@ -91,11 +94,11 @@ def play(scene: Scene, target: str, frame_id: str, interruption: Interruption) -
         rclpy.try_shutdown()
 
 
-def _missing(target: str, publishers: dict, now: float | None) -> str:
+def _missing(target: str, publishers: dict, now: float | None, clock_topic: str) -> str:
     unheard = [name for name, publisher in publishers.items() if not publisher.get_subscription_count()]
     if unheard:
         return f"nobody hears /{target}/tools/{unheard[0]}/pose"
-    return "nobody tells the time on /clock" if now is None else "nobody tells where the tools are, in a frame"
+    return f"nobody tells the time on {clock_topic}" if now is None else "nobody tells where the tools are, in a frame"
 
 
 def _past(scene: Scene, target: str, now: float) -> str:

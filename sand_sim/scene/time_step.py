@@ -8,6 +8,7 @@ import numpy as np
 from sand_sim.contact.cohesion import CohesionLaw
 from sand_sim.contact.law import PairNumbers
 from sand_sim.contact.model import ContactModel
+from sand_sim.precision import Precision
 from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.side_springs import friction_spring, rolling_spring
 from sand_sim.scene.stable_step import DEEP, network_steps
@@ -19,6 +20,9 @@ STABLE_FRACTION = 1.0  # of the largest step that is stable in a dense bed; a bo
 PARTING_FRACTION = 1.0 / 25.0  # of the shortest parting time
 TRAVEL_FRACTION = 0.05  # of the smallest radius, which nothing crosses in one step
 REFUSED = 3.0  # times the chosen step: a user's step beyond is refused unless forced
+_ROUNDED = 1e-3  # of what gravity gives, that rounding may take off or add, before what it does is carried over
+_RESISTED = 5e-3  # the same of what friction or rolling resistance takes
+_LEVEL = 1e-6  # of gravity: less of it along an axis is none
 _BED, _BOND = "stability of damped contacts", "range of cohesion"
 WARNED = 1.0  # times the chosen step: a user's step beyond is warned about
 
@@ -170,3 +174,16 @@ def choose_time_step(
     if asked > WARNED * safe * 1.0001:
         warning = f"time step {asked:.3g} s is {asked / safe:.1f} times the safe step of {safe:.3g} s ({reason})"
     return TimeStep(asked, safe, contact, rayleigh, speed, reason, warning, stable)
+
+
+def loses_digits(scene: Scene, time_step: TimeStep, precision: Precision) -> bool:
+    """Whether rounding the fastest velocity to expect may change it by a notable share of the least that it gains in a step.
+
+    That is what gravity gives along an axis, or what friction or rolling resistance takes from a grain that it presses down.
+    """
+    whole = float(np.linalg.norm(scene.gravity))
+    allowed = [_ROUNDED * abs(along) for along in scene.gravity if abs(along) > _LEVEL * whole]
+    numbers = {"friction", "rolling_friction"}.intersection(scene.contact.asks)
+    allowed += [_RESISTED * rule.numbers[name] * whole for rule in scene.pairs for name in numbers & rule.numbers.keys()]
+    least = min((share for share in allowed if share > 0.0), default=np.inf)
+    return 0.5 * precision.epsilon * time_step.speed > least * time_step.value

@@ -9,7 +9,9 @@ import time
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
+import yaml
 from scenes import write_small_scene
 
 PATIENCE = 120.0
@@ -190,3 +192,22 @@ def test_ctrl_c_ends_the_demo_and_its_processes(tmp_path, delay):
     assert "Traceback" not in errors
     left = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True).stdout
     assert str(tmp_path) not in left
+
+
+def test_two_demos_do_not_drive_each_other(tmp_path):
+    """Both have a tool of the same name, on ways of their own, on one machine and in one ROS domain."""
+    pytest.importorskip("rclpy", reason="needs ROS 2")
+    started = []
+    for name, aside in (("one", 0.0), ("other", 0.03)):
+        (tmp_path / name).mkdir()
+        write_small_scene(tmp_path / name)
+        scene = yaml.safe_load((tmp_path / name / "small.yaml").read_text())
+        for stop in scene["tools"]["plate"]["trajectory"]:
+            stop["position"][0] += aside
+        (tmp_path / name / "small.yaml").write_text(yaml.safe_dump(scene))
+        started.append(sand_sim(tmp_path / name, "demo", "small.yaml", "--out", "results"))
+    for process, name, end in zip(started, ("one", "other"), (0.02, 0.05), strict=True):
+        code, _, errors = finish(process)
+        assert code == 0, errors
+        history = np.load(tmp_path / name / "results" / "small.npz")
+        assert history["plate.position"][-1] == pytest.approx([end, 0.015, 0.05], abs=1e-6)
