@@ -59,7 +59,7 @@ def too_many(area: float, number: float, radius: float) -> MeshError:
     """What to say of an area [m^2] that would need too many particles of a radius [m]."""
     return MeshError(
         f"a surface of {area:.3g} m^2 would need {number:.2g} particles of radius {radius:.3g} m; "
-        "check the mesh's scale, or take larger particles"
+        "check the mesh's scale (0.001 for millimetres), or take larger particles"
     )
 
 

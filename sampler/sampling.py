@@ -59,7 +59,7 @@ def sample_body(
         spacing: wanted distance between neighbours [m]; 1.5 radii if None, less where ``grain`` asks for it.
         seed: of the random start.
         device: Warp device.
-        progress: called with the share of the work done, 0 to 1.
+        progress: called with the share of the work done, 0 to 1; at 0 from the start until particles relax.
         count: wanted number of particles, instead of a spacing.
         grain: radius of the smallest grain that must not pass [m].
         inset: put the centres one radius below the surface, so that the body keeps its outer size, and in the middle of
@@ -74,6 +74,7 @@ def sample_body(
     """
     lengths = {"radius": radius, "spacing": spacing, "smallest grain": grain, "sheet thickness": thickness}
     check_options(lengths, count, seed, device)
+    progress(0.0)  # mending, and cutting parts that cross, may take a while
     repaired = mesh if isinstance(mesh, RepairedMesh) else repair_mesh(mesh, sheets)
     thickness = 2.0 * radius if thickness is None else thickness
     if np.any(repaired.kind == SHEET):

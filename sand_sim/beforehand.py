@@ -97,9 +97,15 @@ def find_fine_surfaces(assembly: Assembly) -> tuple[str, ...]:
         if touched > _CROWD:
             doubts.append(
                 f"grains touch about {touched:.0f} {spheres} at once, so contacts are stiffer and restitution lower than "
-                f"asked; take a {field} nearer to {0.3 * radius:.2g} m"
+                f"asked; take a {field} of at least {_coarse_enough(radius, overlap, spacing / ball):.2g} m"
             )
     return tuple(doubts)
+
+
+def _coarse_enough(radius: float, overlap: float, spread: float) -> float:
+    """Radius [m] of spheres ``spread`` radii apart of which a grain touches no more than may be, by ``particles_touched``."""
+    share = particles_touched(radius, 0.0, spread, overlap) / (_CROWD * radius)
+    return 1.05 * 0.5 * (share + np.sqrt(share * (share + 4.0 * radius)))  # more, because it is shown rounded
 
 
 def _layers(assembly: Assembly) -> Iterator[tuple[str, str, float, float, str]]:

@@ -37,8 +37,10 @@ def summary_text(summary: dict) -> str:
         (
             "energy balance",
             f"at the start {start:.3g} + work of tools {energy['tool_work']:.4g} J = kinetic {energy['kinetic']:.3g}"
-            f" + potential {energy['potential']:.3g} + elastic {energy['elastic']:.3g} + dissipated {energy['dissipated']:.4g}",
+            f" + potential {energy['potential']:.3g} + elastic {energy['elastic']:.3g} + the rest, dissipated"
+            f" {energy['dissipated']:.4g}",
         ),
+        ("energy from nowhere", f"{energy['gained']:.2g} J, by which that rest has fallen"),
     ]
     for name, tool in summary["tools"].items():
         rows.append((f"{name}: peak draft", f"{tool['peak_draft_N']:.1f} N"))

@@ -1,5 +1,7 @@
 """What is doubted about a world before its first step, and that it is not in order there."""
 
+import re
+
 import numpy as np
 import pytest
 import trimesh
@@ -61,6 +63,28 @@ def test_the_largest_grain_decides_whether_a_surface_is_too_fine(make_world):
         domain={"low": [-0.1, -0.1, -0.05], "high": [0.1, 0.1, 0.15]},
     )
     assert any("virtual spheres of 'floor' at once" in doubt for doubt in world.observe().health.doubts)
+
+
+@pytest.mark.parametrize("young", [1e8, 3e5])
+def test_the_advice_on_too_fine_a_surface_helps(make_world, young):
+    """Stiff grains sink in little; soft ones touch many particles even where these are half as large as they are."""
+
+    def doubts(particle):
+        rough = {"radius": particle, "spacing": 1.5 * particle}
+        world = make_world(
+            [[0.001, 0.002, 3.0 * RADIUS]],
+            RADIUS,
+            velocity=[0.0, 0.0, -SPEED],
+            boundaries=[floor()[0] | {"rough": rough}],
+            material={"density": 2500.0, "young": young, "poisson": 0.25},
+            domain={"low": [-0.1, -0.1, -0.05], "high": [0.1, 0.1, 0.15]},
+        )
+        return [doubt for doubt in world.observe().health.doubts if "virtual spheres of 'floor' at once" in doubt]
+
+    [told] = doubts(0.0002)
+    advised = float(re.search(r"of at least (\S+) m", told).group(1))
+    assert doubts(0.8 * advised) != []
+    assert doubts(advised) == []
 
 
 def stack(layers, overlap):

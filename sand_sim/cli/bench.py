@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 from sand_sim.cli.console import Console
+from sand_sim.cli.writing import check_file
 from sand_sim.engine.lanes import available_cores
 from sand_sim.interruption import InterruptedByUserError, Interruption
 from sand_sim.scene.types import SceneError
@@ -45,6 +46,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     threads = options.threads or [1, available_cores()]
     if min(*threads, options.rounds, options.work) < 1:
         raise SceneError("bench: --threads, --rounds and --work must be at least 1")
+    check_file(options.out, "--out")
     console, failed = Console(), False
 
     def progress(stage: str, share: float) -> None:
@@ -76,6 +78,5 @@ def _write(row: dict, out: Path | None) -> None:
     line = json.dumps(row)
     print(line, flush=True)
     if out:
-        out.parent.mkdir(parents=True, exist_ok=True)
         with out.open("a") as file:
             print(line, file=file)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from sand_sim.cli.writing import make_folder
 from sand_sim.config_folder import find_scene
 from sand_sim.interruption import Interruption
 from sand_sim.playing import driven_tools
@@ -28,7 +29,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     path = find_scene(options.scene)
     scene = load_scene(path)
     driven_tools(scene)  # or nothing would come of it
-    options.out.mkdir(parents=True, exist_ok=True)  # now, not when all has been done
+    make_folder(options.out)
     parameters = {
         "scene": str(path),
         "pacing": "lockstep",

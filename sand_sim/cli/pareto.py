@@ -15,6 +15,7 @@ import yaml
 
 from sand_sim.cli.console import Console
 from sand_sim.cli.numbers import count, positive
+from sand_sim.cli.writing import check_file, make_folder
 from sand_sim.config_folder import find_scene
 from sand_sim.interruption import InterruptedByUserError, Interruption
 from sand_sim.scene.reading import load_scene
@@ -52,7 +53,8 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb."""
     console, path = Console(), find_scene(options.scene)
     scene = load_scene(path)
-    options.out.mkdir(parents=True, exist_ok=True)  # now, not when all has been done
+    make_folder(options.out)
+    check_file(options.write, "--write")
     whole = yaml.safe_load(path.read_text(encoding="utf-8"))
     facts = Facts.of(scene)
     preparation = prepare(path, scene, facts.grains, options.quantity)
@@ -85,7 +87,9 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         kept = write_scene(path, _apply(chosen[0], whole, facts), options.write)
         load_scene(options.write)
         print(f"written: {options.write}" + ("" if kept else ", without the comments of the original"))
-    return 130 if stopped else 0
+    elif options.write:
+        print(f"not written: {options.write}, because nothing is recommended")
+    return 130 if stopped else int(bool(options.write) and not chosen)
 
 
 def _sum_up(study: Study, chosen: tuple | None, tolerance: float) -> None:

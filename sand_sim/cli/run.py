@@ -11,6 +11,7 @@ from sand_sim.checkpoint import CheckpointError, take_checkpoint
 from sand_sim.checkpoints import PERIOD, CheckpointFolder
 from sand_sim.cli.console import Console
 from sand_sim.cli.numbers import count, positive
+from sand_sim.cli.writing import make_folder
 from sand_sim.config_folder import find_scene
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.interruption import Interruption
@@ -39,7 +40,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb."""
     console = Console()
     scene = load_scene(find_scene(options.scene))
-    options.out.mkdir(parents=True, exist_ok=True)  # now, not when all has been done
+    make_folder(options.out)
     if options.threads:
         scene = replace(scene, solver=replace(scene.solver, threads=options.threads))
 

@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 
 from sand_sim.cli.console import Console
+from sand_sim.cli.writing import make_folder
 from sand_sim.interruption import Interruption
 from sand_sim.study.stability import sweep, table_text
 
@@ -18,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb; the exit code is 1 if anything is silently wrong, or an automatic time step not stable."""
-    options.out.mkdir(parents=True, exist_ok=True)  # now, not when all has been done
+    make_folder(options.out)
     console = Console()
     result = sweep(options.quick, lambda what, share: console.line(f"{100.0 * share:3.0f} %  {what}"), interruption.check)
     console.end()

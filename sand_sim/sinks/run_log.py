@@ -155,7 +155,9 @@ class RunLog:
         if self.last is None:
             return {"steps": 0}
         columns, health = self.columns(), self.last.health
-        energies = {name: getattr(health, name) for name in ("tool_work", "kinetic", "potential", "elastic", "dissipated")}
+        energies = {
+            name: getattr(health, name) for name in ("tool_work", "kinetic", "potential", "elastic", "dissipated", "gained")
+        }
         summary = {
             "grains": len(self.last.grains),
             "retired_grains": health.retired,

@@ -64,7 +64,7 @@ def test_run_writes_everything_and_sums_up(tmp_path):
     assert summary["doubts"] == []
     for kind in ("rrd", "npz", "png"):
         assert (tmp_path / "results" / f"small.{kind}").stat().st_size > 1000
-    for word in ("real-time factor", "peak draft", "energy balance", "largest overlap / radius"):
+    for word in ("real-time factor", "peak draft", "energy balance", "energy from nowhere", "largest overlap / radius"):
         assert word in output
 
 
@@ -104,8 +104,16 @@ def test_a_folder_that_cannot_be_made_is_refused_at_once(tmp_path, words):
     (tmp_path / "file").touch()
     code, output, errors = finish(sand_sim(tmp_path, *words, "--out", "file/out"))
     assert code == 1
-    assert errors.startswith("sand_sim: [Errno 20] Not a directory: 'file/out")
-    assert len(errors.strip().splitlines()) == 1
+    assert errors == "sand_sim: --out file/out: is no folder that can be made: Not a directory; name another\n"
+    assert not output
+
+
+@pytest.mark.parametrize("option", [["pareto", "impact", "--write"], ["bench", "W1-1000", "--out"]])
+def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path, option):
+    (tmp_path / "folder").mkdir()
+    code, output, errors = finish(sand_sim(tmp_path, *option, "folder"))
+    assert code == 1
+    assert errors == f"sand_sim: {option[-1]} folder: cannot be written; name another file\n"
     assert not output
 
 
