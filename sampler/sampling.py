@@ -115,7 +115,9 @@ def sample_body(
 
     points, normals, evenness, wanted, area = _spread_tight(spread, skin, radius, fine, count, grain)
     size = float(np.linalg.norm(np.ptp(repaired.triangles, axis=(0, 1))))  # of sheets, too
-    uneven = broken_limits(evenness, len(points), wanted, radius, size)
+    doubtful = broken_limits(evenness, len(points), wanted, radius, size)
+    if spacing is not None and fine < spacing:
+        doubtful.append(f"particles lie {fine:.3g} m apart, not {spacing:.3g} m, or grains of radius {grain:.3g} m could pass")
     return ParticleBody(
         points=points,
         normals=normals,
@@ -129,7 +131,7 @@ def sample_body(
         thinnest_wall=thinnest_wall(around),
         evenness=evenness,
         steps=dict(repaired.report.steps),
-        warnings=(*repaired.report.warnings, *uneven),
+        warnings=(*repaired.report.warnings, *doubtful),
         mass_warnings=tuple(doubts),
     )
 

@@ -1,7 +1,7 @@
 """Terrain: ground that never moves, from a mesh or from a grid of heights, as particles or as the surface itself."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -96,6 +96,8 @@ def model_ground(boundary: Boundary, folder: Path, progress: Callable[[float], N
         place = mesh.bounds.mean(axis=0)
         mesh.vertices = mesh.vertices - place
         body = sample_body(mesh, terrain.particle_radius, progress=progress)
+        if terrain.heights:
+            body = replace(body, warnings=())  # that it is an open surface goes without saying
     except (MeshError, SceneError) as error:
         raise SceneError(f"boundaries: {source} of terrain '{boundary.name}': {error}") from None
     surface = outward_triangles(body.triangles) if terrain.contact == SMOOTH else None

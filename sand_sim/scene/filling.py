@@ -306,5 +306,7 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
 def _refuse_unknown(names: Iterable[str], known: Iterable[str]) -> None:
     """A column of which the name is misspelt would be left out in silence."""
     unknown = [name for name in names if name not in known]
+    if unknown and unknown[0].replace(".", "").strip("+-").isdigit():
+        raise ValueError(f"the first line, with {unknown[0]} in it, must name the columns; known are {', '.join(known)}")
     if unknown:
         raise ValueError(f"unknown column '{unknown[0]}'; known are {', '.join(known)}; rename it or leave it out")

@@ -142,7 +142,10 @@ def read_shape(path: Path) -> Shape:
             centres = np.array([[row[axis] for axis in "xyz"] for row in rows]).reshape(-1, 3)
             radii = np.array([row["radius"] for row in rows])
     except OSError as error:
-        raise SceneError(f"shape: file '{path.name}' cannot be read: {error.strerror or error}") from None
+        raise SceneError(
+            f"shape: '{path.name}' is neither {SPHERE} nor {TETRAHEDRON}, and cannot be read as a file of spheres: "
+            f"{error.strerror or error}"
+        ) from None
     except (KeyError, ValueError, TypeError, AttributeError) as error:
         raise SceneError(f"shape: file '{path.name}' needs the columns x, y, z, radius in numbers: {error}") from None
     if not len(radii) or centres.shape != (len(radii), 3):

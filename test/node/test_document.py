@@ -28,7 +28,6 @@ def test_documented_tests_pass_beside_each_other(tmp_path):
     shown = re.search(r"```python\n(.*?)```", section, re.DOTALL).group(1)
     for name in ("one", "other"):
         (tmp_path / f"test_{name}.py").write_text(shown)
-    write_small_scene(tmp_path).rename(tmp_path / "my_scene.yaml")
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
     command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "loadfile", "-p", "no:cacheprovider", tmp_path]
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120, check=False)

@@ -228,3 +228,10 @@ def test_millimetres_taken_for_metres_are_told():
         sample_body(mesh, radius=1e-4)
     with pytest.raises(MeshError, match="check the mesh's scale"):
         sample_body(mesh, radius=0.1, count=10**15)
+
+
+def test_a_spacing_that_would_let_grains_pass_is_made_finer_and_told():
+    ball = trimesh.creation.icosphere(3, 0.05)
+    told = [sample_body(ball, 0.005, spacing=0.012, grain=grain).warnings for grain in (None, 0.02, 0.001)]
+    assert told[:2] == [(), ()]
+    assert told[2] == ("particles lie 0.0069 m apart, not 0.012 m, or grains of radius 0.001 m could pass",)

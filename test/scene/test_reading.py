@@ -70,6 +70,11 @@ def test_good_scene_is_read():
             {"normal": {"mean": 0.003, "deviation": 0.002}},
             "fills[0].radius.normal: is cut two deviations below the mean, at -0.001 m, which is no radius; give a 'low'",
         ),
+        (
+            ("fills", 0),
+            {"material": "sand", "file": "bed.npz", "seed": 1},
+            "fills[0].seed: has no effect on grains from a file, which says where and how large they are; leave it out",
+        ),
         (("boundaries", 0, "normal"), [0, 0, 0], "boundaries[0].normal: must not be the zero vector"),
         (("boundaries", 0, "normal"), [0, 0, float("nan")], "boundaries[0].normal[2]: must be finite"),
         (("tools", "spade", "particle_radius"), 0, "tools.spade.particle_radius: must be greater than 0"),
