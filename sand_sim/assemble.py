@@ -270,7 +270,7 @@ def _time_step(
 ) -> tuple[TimeStep, int]:
     """The step, shortened so that a whole number of steps makes a frame unless the scene gives it, and that number."""
     given = float(np.linalg.norm(table.velocity, axis=1).max())
-    speed = fastest_speed(scene, _fall_height(scene, table, walls, grounds), given)
+    speed = fastest_speed(scene, fall_height(scene, table, walls, grounds), given)
     chosen = choose_time_step(scene, smallest, speed, _rough_spacings(tools, grounds))
     frame = 1.0 / scene.frame_rate
     if scene.solver.time_step is not None:
@@ -279,7 +279,7 @@ def _time_step(
     return replace(chosen, value=frame / steps), steps
 
 
-def _fall_height(scene: Scene, table: GrainTable, walls: list[Wall], grounds: list[Ground]) -> float:
+def fall_height(scene: Scene, table: GrainTable, walls: list[Wall], grounds: list[Ground]) -> float:
     """How far a grain can fall at most, past the lowest grain or on to a floor [m]."""
     down = np.asarray(scene.gravity) / (np.linalg.norm(scene.gravity) or 1.0)
     heights = [float(np.ptp(table.position @ down))]

@@ -2,13 +2,15 @@
 
 import numpy as np
 
-from sand_sim.assemble import Assembly
+from sand_sim.assemble import Assembly, fall_height
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.observing import observe_grains
 from sand_sim.scene.types import SceneError
 from sand_sim.tool_model import Progress
 
 _CHUNKS = 50
+_FALL = 0.3  # of the speed at which the highest grain would end its fall
+_SLOWED = 0.2  # share of the time in which drag slows grains down, after which it is applied anew
 
 
 def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> list[str]:
@@ -44,10 +46,15 @@ def _come_to_rest(assembly: Assembly, doubts: tuple[str, ...], progress: Progres
     chunk = max(1, round(asked.time / _CHUNKS / step))
     gravity = float(np.linalg.norm(assembly.scene.gravity))
     turning = 2.0 * asked.speed / gravity if gravity else 0.0  # so long grains that begin to fall or turn are slow
+    drag = _drag(assembly, gravity)
+    part = min(chunk, max(1, round(_SLOWED / drag / step))) if drag else chunk
     slow = 0.0
     for done in range(_CHUNKS):
         try:
-            assembly.solver.run(chunk)
+            for first in range(0, chunk, part):
+                assembly.solver.run(min(part, chunk - first))
+                if drag:
+                    _slow_down(assembly, np.exp(-drag * min(part, chunk - first) * step))
         except UnstableError as error:
             why = "; ".join(doubts) or f"try a smaller time step than {step:.2g} s"
             raise SceneError(f"settle: the bed blows up while it settles: {error}; {why}") from None
@@ -65,6 +72,32 @@ def _come_to_rest(assembly: Assembly, doubts: tuple[str, ...], progress: Progres
         f"settle: grains still move at {speed:.2g} m/s (root mean square) after {asked.time:g} s, speed {asked.speed:g} m/s was "
         "asked; give it more time or ask for less"
     ]
+
+
+def _drag(assembly: Assembly, gravity: float) -> float:
+    """Rate at which a liquid slows grains down that fall in it no faster than asked, or than is good for a bed [1/s].
+
+    A column that falls freely is braked by its walls and springs back: these then push it down for ever, and the floor of a silo
+    carries more than its weight.
+    """
+    fall = assembly.scene.settle.fall
+    if not gravity:
+        return 0.0
+    if fall is None:
+        height = fall_height(assembly.scene, assembly.table, assembly.walls, assembly.grounds)
+        fall = _FALL * np.sqrt(2.0 * gravity * (height + 2.0 * assembly.table.radius.max()))
+    return float(gravity / fall)
+
+
+def _slow_down(assembly: Assembly, share: float) -> None:
+    """Leave grains a share of their velocities."""
+    arrays = assembly.solver.arrays
+    for movers in filter(None, (arrays.grains, arrays.bodies)):
+        for motion in (movers.motion, movers.half_motion):
+            if motion is not None:
+                velocity = motion.numpy()
+                velocity[:, :3] *= share
+                motion.assign(velocity)
 
 
 def _strike_off(assembly: Assembly) -> list[str]:

@@ -38,7 +38,7 @@ def test_what_is_given_for_a_law_that_is_not_chosen_is_told(make_world, further,
 def test_grains_that_have_not_come_to_rest_are_told(make_world):
     def settled(time):
         place = {"boundaries": floor(), "gravity": [0.0, 0.0, -9.81], "restitution": 0.3}
-        return make_world([[0.0, 0.0, 0.02]], 0.005, settle={"time": time, "speed": 0.01}, **place)
+        return make_world([[0.0, 0.0, 0.02]], 0.005, settle={"time": time, "speed": 0.01, "fall": "free"}, **place)
 
     early = settled(0.05)  # 15 mm above the floor, it falls for 55 ms
     assert early.warnings == [
@@ -50,7 +50,7 @@ def test_grains_that_have_not_come_to_rest_are_told(make_world):
 
 
 def test_grains_that_leave_while_they_settle_are_told(make_world):
-    further = {"gravity": [0.0, 0.0, -9.81], "restitution": 0.3, "settle": {"time": 0.5, "speed": 0.01}}
+    further = {"gravity": [0.0, 0.0, -9.81], "restitution": 0.3, "settle": {"time": 0.5, "speed": 0.01, "fall": "free"}}
     further |= {"domain": {"low": [-0.1, -0.1, -0.1], "high": [0.3, 0.1, 0.1]}}
     disc = {"type": "hole_plate", "name": "disc", "material": "wall", "point": [0.0] * 3, "normal": [0.0, 0.0, 1.0]}
     disc |= {"hole_radius": 0.0, "radius": 0.02}

@@ -1,7 +1,9 @@
 """From a scene file (YAML) to a checked ``Scene``."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -233,29 +235,32 @@ def _liquid(entry: Field) -> Liquid:
     )
 
 
+def _auto(entry: Field, key: str, read: Callable) -> Any:
+    """What is read of an entry, None if it is not there or left to the program."""
+    return None if entry.value.get(key) == "auto" else entry.optional(key, read, None)
+
+
 def _solver(entry: Field) -> Solver:
     entry.keys(("time_step", "force_time_step", "skin", "integrator", "precision", "device", "threads"))
-
-    def auto(key, read):
-        return None if entry.value.get(key) == "auto" else entry.optional(key, read, None)
 
     forced = entry.optional("force_time_step", Field.yes_or_no, False)
     if forced and entry.value.get("time_step") in (None, "auto"):
         raise entry["force_time_step"].refuse("needs a 'time_step' of its own")
     return Solver(
-        time_step=auto("time_step", lambda f: f.number(above=0.0, unit="s")),
-        skin=auto("skin", lambda f: f.number(above=0.0, unit="m")),
+        time_step=_auto(entry, "time_step", lambda f: f.number(above=0.0, unit="s")),
+        skin=_auto(entry, "skin", lambda f: f.number(above=0.0, unit="m")),
         integrator=entry.optional("integrator", lambda f: f.choice(INTEGRATORS), VERLET),
         precision=entry.optional("precision", lambda f: f.choice(PRECISIONS), "single"),
         device=entry.optional("device", Field.text, "auto"),
-        threads=auto("threads", lambda f: f.whole(1, 4096)),
+        threads=_auto(entry, "threads", lambda f: f.whole(1, 4096)),
         force_time_step=forced,
     )
 
 
 def _settle(entry: Field) -> Settle:
-    entry.keys(("time", "speed"))
+    entry.keys(("time", "speed", "fall"))
     return Settle(
+        fall=_auto(entry, "fall", lambda f: math.inf if f.value == "free" else f.number(above=0.0, unit="m/s")),
         time=entry.optional("time", lambda f: f.number(least=0.0, unit="s"), 0.0),
         speed=entry.optional("speed", lambda f: f.number(above=0.0, unit="m/s"), 0.01),
     )

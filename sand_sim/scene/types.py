@@ -221,6 +221,7 @@ class Settle:
 
     time: float = 0.0  # [s] at most
     speed: float = 0.01  # [m/s] root mean square below which the bed counts as settled
+    fall: float | None = None  # [m/s] fastest that grains fall meanwhile, as in a liquid; None: chosen; infinite: freely
 
 
 @dataclass(frozen=True)
