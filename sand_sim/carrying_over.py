@@ -110,9 +110,10 @@ def fit(assembly: Assembly, loaded: Assembly, models: dict, state: dict[str, np.
         np.array_equal(getattr(table, name)[len(loaded.table) :], rows) for name, rows in zip(_ADDED, wanted, strict=True)
     ):
         table = GrainTable.join([loaded.table, _added_rows(assembly, *wanted)])
-    if len(state["grains.place"]) != len(table) or len(state.get("mesh.path", tools)) != len(tools):
+    spheres = len(state.get("grains.place", ()))
+    if spheres != len(table) or len(state.get("mesh.path", tools)) != len(tools):
         raise ValueError(
-            f"state: is of another scene: it has {len(state['grains.place'])} spheres and {len(state.get('mesh.path', tools))} "
+            f"state: is of another scene: it has {spheres} spheres and {len(state.get('mesh.path', tools))} "
             f"tools, this scene {len(loaded.table)} spheres, {len(table) - len(loaded.table)} added later, and {len(tools)} tools"
         )
     for index, (path, scale) in enumerate(zip(state.get("mesh.path", ()), state.get("mesh.scale", ()), strict=True)):

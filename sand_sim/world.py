@@ -276,10 +276,11 @@ class World(Changeable):
         Raises:
             ValueError: if the state is of another scene; nothing is changed then.
         """
-        self.assembly = fit(self.assembly, self._loaded, self._models, state)
+        fitting = fit(self.assembly, self._loaded, self._models, state)
+        check_layout(state, expect_layout(self._initial, state))
+        self.assembly = fitting
         self._solver.put_state(state)
-        columns = [state[f"track.{name}"] for name in Track.__dataclass_fields__]
-        self._tracks = [Track(*values) for values in zip(*columns, strict=True)]
+        self._tracks = [Track(*row) for row in zip(*(state[f"track.{name}"] for name in Track.__dataclass_fields__), strict=True)]
         self._look_anew()
         self._swept.restore(state)
         self._start = StartEnergy(*(float(value) for value in state["start"]))

@@ -294,6 +294,12 @@ def test_state_of_another_scene_is_refused(tmp_path):
     before = other.save()
     with pytest.raises(ValueError, match="2 spheres and 0 tools, this scene 1 spheres, 0 added later"):
         other.restore(one.save())
+    with pytest.raises(ValueError, match="it has 0 spheres"):
+        other.restore({})
+    springs = {"contact": {"rolling": "spring"}, "numbers": {"rolling_friction": 0.1}}
+    law = World(read_scene(maker.scene([[0.0, 0.0, 0.1]], SMALL, **wide, **springs), tmp_path))
+    with pytest.raises(ValueError, match="array '.*memory' is float"):
+        other.restore(law.save())
     assert same_state(other.save(), before)
 
 

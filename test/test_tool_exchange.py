@@ -1,5 +1,7 @@
 """Another mesh for a tool while its world runs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -116,7 +118,6 @@ def test_new_shape_is_what_grains_meet(tmp_path):
         ("plate.stl", 0.0, "bad_mesh", "scale must be positive"),
         ("plate.stl", np.nan, "bad_mesh", "scale must be positive"),
         ("plate.stl", 30.0, "too_large", "the domain is only 0.45 m wide"),
-        ("plate.stl", 1e-4, "too_fine", "ask for a time step of"),
     ],
 )
 def test_what_does_not_fit_is_refused_and_changes_nothing(tmp_path, mesh, scale, reason, message):
@@ -131,6 +132,19 @@ def test_what_does_not_fit_is_refused_and_changes_nothing(tmp_path, mesh, scale,
     assert same_state(world.save(), before)
     with pytest.raises(CommandError, match="'spade' is unknown"):
         world.set_tool_mesh("spade", "plate.stl")
+
+
+def test_a_tool_that_asks_for_a_smaller_time_step_is_refused_and_changes_nothing(tmp_path, monkeypatch):
+    """One of which a grain touches many particles at once; the sampler makes none such of the same radius."""
+    world = drawn(tmp_path)
+    fine = replace(world.tools[0], body=replace(world.tools[0].body, spacing=1e-4))
+    monkeypatch.setattr("sand_sim.tool_exchange.model_tool", lambda *options: fine)
+    world.observe()
+    before = world.save()
+    with pytest.raises(CommandError, match="particles 0.0001 m apart, which ask for a time step of") as error:
+        world.set_tool_mesh("plate", "plate.stl")
+    assert error.value.reason == "too_fine"
+    assert same_state(world.save(), before)
 
 
 @pytest.mark.parametrize("precision", ["single", "double"])
