@@ -298,7 +298,7 @@ def test_state_of_another_scene_is_refused(tmp_path):
         other.restore({})
     springs = {"contact": {"rolling": "spring"}, "numbers": {"rolling_friction": 0.1}}
     law = World(read_scene(maker.scene([[0.0, 0.0, 0.1]], SMALL, **wide, **springs), tmp_path))
-    with pytest.raises(ValueError, match="array '.*memory' is float"):
+    with pytest.raises(ValueError, match=r"array '.*memory' is float"):
         other.restore(law.save())
     assert same_state(other.save(), before)
 

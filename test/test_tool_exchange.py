@@ -141,7 +141,7 @@ def test_a_tool_that_asks_for_a_smaller_time_step_is_refused_and_changes_nothing
     monkeypatch.setattr("sand_sim.tool_exchange.model_tool", lambda *options: fine)
     world.observe()
     before = world.save()
-    with pytest.raises(CommandError, match="particles 0.0001 m apart, which ask for a time step of") as error:
+    with pytest.raises(CommandError, match=r"particles 0\.0001 m apart, which ask for a time step of") as error:
         world.set_tool_mesh("plate", "plate.stl")
     assert error.value.reason == "too_fine"
     assert same_state(world.save(), before)
