@@ -70,7 +70,10 @@ def fill_grains(
         points = points[clear]
     wanted = fill.count or _count_for_height(fill, walls, random)
     radius = _draw(fill.size, min(wanted, _MOST_PLACES), random)
-    position, room = _seat(points, radius * reach, largest, [is_clear for _, is_clear in obstacles], random)
+    try:
+        position, room = _seat(points, radius * reach, largest, [is_clear for _, is_clear in obstacles], random)
+    except TooManyPairsError as error:
+        raise SceneError(f"fills: '{fill.name}' shares too large a region with other fills: {error}") from None
     if wanted > room:
         cause = "".join(f"; {what} takes {some} of its {places} places" for what, some in taken if 2 * some > places)
         raise SceneError(
