@@ -319,8 +319,7 @@ class World(Changeable):
         return UnstableError(f"blown up at t = {blown:.6g} s: {cause}; kept is the state at t = {self.time:.6g} s; {remedy}")
 
     def _set_tracks(self, tracks: list[Track]) -> None:
-        self._tracks = tracks
-        structs = []
+        self._tracks, structs = tracks, []
         for track in [*tracks, *self._grounds]:
             one = ToolTrack()
             one.begin_time, one.end_time = track.begin_time, track.end_time

@@ -39,9 +39,9 @@ def play(scene: Scene, target: str, frame_id: str, clock_topic: str, interruptio
             gone before the end.
     """
     driven = driven_tools(scene)
-    for option, name in (("--node", f"/{target}"), ("--clock", clock_topic)):
+    for option, name, topic in (("--node", target, f"/{target}"), ("--clock", clock_topic, clock_topic)):
         try:
-            validate_full_topic_name(name)
+            validate_full_topic_name(topic)
         except NameValidationException as error:
             raise SceneError(f"{option} '{name}': {' '.join(str(error).split())}") from None
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
