@@ -17,7 +17,7 @@ from sand_sim.engine.tool_body import ToolBody
 from sand_sim.grain_table import GrainTable
 from sand_sim.playing import check_trajectory
 from sand_sim.precision import PRECISIONS, Precision
-from sand_sim.scene.checking import check_scene, unused_numbers
+from sand_sim.scene.checking import check_scene, odd_numbers, unused_numbers
 from sand_sim.scene.filling import fill_grains, own_frames, smallest_of_materials, smallest_sphere
 from sand_sim.scene.pairing import pair_numbers
 from sand_sim.scene.stable_step import DEEP
@@ -119,7 +119,7 @@ class Assembly:
         threads, cores = self.scene.solver.threads or 0, available_cores()
         waiting = f"solver.threads: {threads} on {cores} cores wait for one another; ask for at most {cores}"
         told = [self.time_step.warning, waiting if threads > cores else ""]
-        return [*filter(None, told), *unused_numbers(self.scene), *meshes]
+        return [*filter(None, told), *odd_numbers(self.scene), *unused_numbers(self.scene), *meshes]
 
     def safe_step(self, speed: float, depth: float) -> float:
         """The step [s] that would be safe at a top speed [m/s] and an overlap over radius [1]."""

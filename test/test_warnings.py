@@ -23,6 +23,15 @@ LIQUID = {"bridge_volume": 0.01}
             {"numbers": {"rolling_friction": 0.1}},
             ["pairs: 'rolling_friction' has no effect; .* would have to say rolling: constant, or rolling: spring$"],
         ),
+        ({"friction": 4.0, "material": {"density": 12.0, "young": 1e7, "poisson": 0.25}}, []),
+        (
+            {"friction": 35.0},
+            ["pairs: 'grain' and '(grain|wall)' have a friction of 35; it is the tangent of an angle, not the"] * 2,
+        ),
+        (
+            {"material": {"density": 2.6, "young": 1e7, "poisson": 0.25}},
+            ["materials.grain: a density of 2.6 kg/m.3 is that of a foam; is it in g/cm.3\\?$"],
+        ),
         ({"numbers": {"adhesion": 0.1}}, ["pairs: 'adhesion' has no effect; .* say cohesion: dmt, or cohesion: jkr$"]),
         ({"liquid": LIQUID, "contact": {"cohesion": "capillary"}}, []),
         ({"liquid": LIQUID}, ["liquid: has no effect; the section 'contact' would have to say cohesion: capillary$"]),

@@ -52,6 +52,23 @@ def check_scene(scene: Scene) -> None:
                 raise SceneError(f"domain: must contain the region of fill '{fill.name}', its grains would be retired at once")
 
 
+_STEEP, _LIGHT = 5.0, 10.0  # friction, and density [kg/m^3], from which another unit is more likely meant
+
+
+def odd_numbers(scene: Scene) -> list[str]:
+    """Numbers that are possible, but more likely in another unit."""
+    steep = [(rule.between, rule.numbers.get("friction", 0.0)) for rule in scene.pairs]
+    told = [
+        f"pairs: '{a}' and '{b}' have a friction of {value:g}; it is the tangent of an angle, not the angle"
+        for (a, b), value in steep
+        if value >= _STEEP
+    ]
+    light = [one for one in scene.materials if one.density < _LIGHT]
+    return told + [
+        f"materials.{one.name}: a density of {one.density:g} kg/m^3 is that of a foam; is it in g/cm^3?" for one in light
+    ]
+
+
 def unused_numbers(scene: Scene) -> list[str]:
     """What the scene gives for the sake of contact laws that it has not chosen, for whoever forgot to choose them."""
     told, chosen = [], set(scene.contact.asks)
