@@ -103,6 +103,16 @@ def test_of_a_sheet_counts_what_is_outside_of_solids(edge, height, added):
     assert any("sheets reach into solids" in warning for warning in body.mass_warnings) == (edge > 0.5)  # 1 % of the whole
 
 
+def test_sheets_that_overlap_more_than_fits_in_are_counted_from_inside():
+    """Eight sheets, each six times as thick as they are apart, beside a plate: 0.13 high together, not 0.48."""
+    plate = trimesh.creation.box((1.0, 1.0, 0.02)).apply_translation([0.0, 0.0, -0.05])
+    corners = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    sheets = [trimesh.Trimesh(np.column_stack([corners, np.full(4, 0.01 * k)]), [[0, 1, 2], [0, 2, 3]]) for k in range(8)]
+    body = sample_body(trimesh.util.concatenate([plate, *sheets]), 0.03, count=800)
+    assert body.volume == pytest.approx(0.13 + 0.02, rel=0.02)
+    assert any("sheets overlap" in warning for warning in body.mass_warnings)
+
+
 @pytest.mark.parametrize("gap", [0.03, 0.06])
 def test_cracked_solids_weigh_what_lies_inside_of_them(gap):
     """The integral over patches that do not meet lacks twice the share of their gaps: 6 or 12 %."""
