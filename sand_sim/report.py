@@ -42,6 +42,8 @@ def summary_text(summary: dict) -> str:
         ),
         ("energy from nowhere", f"{energy['gained']:.2g} J, by which that rest has fallen"),
     ]
+    if summary["interrupted"]:
+        rows.insert(3, ("interrupted", "by the user, before its end"))
     for name, tool in summary["tools"].items():
         rows.append((f"{name}: peak draft", f"{tool['peak_draft_N']:.1f} N"))
         rows.append((f"{name}: peak lift", f"{tool['peak_lift_N']:.1f} N"))

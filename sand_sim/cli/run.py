@@ -79,6 +79,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         if checkpoints and checkpoints.due(world.steps):
             checkpoints.offer(take_checkpoint(world, history=recorder.log.pack()))
         if interruption.asked:
+            recorder.log.interrupted = True
             break
     console.end()
     if checkpoints:

@@ -64,6 +64,7 @@ class RunLog:
         last: the last observation.
         views: the bed at the end of each phase of a trajectory, by the phase's name.
         fault: why the run stopped before its end, empty if it did not.
+        interrupted: whether the user stopped it.
         identity: the same before and after a run has been resumed.
         most_rows: how many are kept; beyond, every other one is given up, and from then on every other frame is written.
     """
@@ -74,6 +75,7 @@ class RunLog:
     last: Observation | None = None
     views: dict[str, View] = field(default_factory=dict)
     fault: str = ""
+    interrupted: bool = False
     identity: str = field(default_factory=lambda: uuid4().hex)
     most_rows: int = 2**31
     _every: int = 1
@@ -164,6 +166,7 @@ class RunLog:
             "steps": self.last.steps,
             "time_step_s": health.time_step,
             "simulated_s": self.last.time,
+            "interrupted": self.interrupted,
             "wall_s": columns["wall"][-1],
             "real_time_factor": self.real_time_factor,
             "contacts": health.contacts,

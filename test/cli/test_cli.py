@@ -157,7 +157,10 @@ def test_ctrl_c_keeps_what_was_recorded(tmp_path):
     code, output, errors = finish(process)
     assert code == 130
     assert "Traceback" not in errors
-    assert json.loads((tmp_path / "results" / "dig.json").read_text())["steps"] > 0
+    summary = json.loads((tmp_path / "results" / "dig.json").read_text())
+    assert summary["steps"] > 0
+    assert summary["interrupted"]
+    assert "interrupted               by the user, before its end" in output
     assert "written: results/dig.rrd" in output
 
 
