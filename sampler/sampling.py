@@ -158,12 +158,12 @@ def _spread_tight(
         Centres, shape (n, 3) [m], and normals, shape (n, 3); how they lie; how many were wanted; the area that they share [m^2].
     """
     for attempt in range(_TRIES):
-        found = _spread_once(spread, skin, radius, spacing, count)
-        if not attempt and max(found[2].farthest, found[2].coverage / _COVERED) > _LOOSE:
-            rows = with_rows(skin, spacing if count is None else lattice_spacing(found[4], count))
+        found = points, _, evenness, _, area = _spread_once(spread, skin, radius, spacing, count)
+        if not attempt and max(evenness.farthest, evenness.coverage / _COVERED) > _LOOSE:
+            rows = with_rows(skin, spacing if count is None else lattice_spacing(area, count))
             if rows is not skin:
-                skin, found = rows, _spread_once(spread, rows, radius, spacing, count)
-        points, _, evenness, _, area = found
+                skin = rows
+                found = points, _, evenness, _, area = _spread_once(spread, skin, radius, spacing, count)
         coverage = evenness.coverage * lattice_spacing(area, len(points))
         if grain is None or coverage < radius + grain:
             return found

@@ -73,8 +73,8 @@ def with_rows(skin: Skin, spacing: float) -> Skin:
         pieces = np.concatenate([pieces[~large], halve_triangles(pieces[large])])
         parent = np.concatenate([parent[~large], np.tile(parent[large], 2)])
         size = longest_edges(pieces)
-    own = Skin.areas_of(pieces)
-    area = own * (skin.areas / Skin.areas_of(skin.triangles))[parent]
+    whole = Skin.areas_of(skin.triangles)
+    area = Skin.areas_of(pieces) * (skin.areas / whole)[parent]
     places = pieces.mean(axis=1) / spacing
     cell = np.floor(places / _TOGETHER).astype(np.int64)
     cell -= cell.min(axis=0)
@@ -83,10 +83,9 @@ def with_rows(skin: Skin, spacing: float) -> Skin:
     middle = np.column_stack([np.bincount(which, area * places[:, k]) for k in range(3)]) / together[:, None]
     middle = (middle - middle.mean(axis=0)).astype(np.float32)
     wanted = _wanted(middle, together / spacing**2, skin.device)
-    share = np.bincount(parent, (area * wanted[which]), len(skin.triangles)) / np.bincount(parent, area, len(skin.triangles))
-    if np.all(share == 1.0):
+    if np.all(wanted == 1.0):
         return skin
-    return Skin(skin.triangles, skin.device, Skin.areas_of(skin.triangles) / (skin.areas * share))
+    return Skin(skin.triangles, skin.device, whole / np.bincount(parent, area * wanted[which], len(whole)))
 
 
 def _wanted(places: np.ndarray, areas: np.ndarray, device: str) -> np.ndarray:

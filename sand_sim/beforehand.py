@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sand_sim.assemble import Assembly, material_order
+from sand_sim.driven import wall_numbers
 from sand_sim.observing import observe_grains
 from sand_sim.scene.pairing import effective_young, pair_numbers
 from sand_sim.scene.stable_step import DEEP, particles_touched
@@ -41,7 +42,7 @@ def _strained(assembly: Assembly) -> str:
     name = max(most, key=most.get)
     partner = most[name][1]
     if name == "wall":
-        return assembly.walls[np.searchsorted(arrays.walls.numpy()["first"], partner, side="right") - 1].label
+        return assembly.walls[wall_numbers(assembly, partner)].label
     if name == "tool":
         return [*assembly.tools, *assembly.grounds][arrays.tools.tool_of.numpy()[partner]].label
     return "one another"

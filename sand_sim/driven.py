@@ -47,6 +47,11 @@ def forces_on_walls(assembly: Assembly) -> np.ndarray:
     """Forces of the grains on all analytic walls, shape (walls, 3) [N]."""
     arrays = assembly.solver.arrays
     contacts, number = arrays.wall_list, arrays.wall_list.pairs.get()
-    wall = np.searchsorted(arrays.walls.numpy()["first"], contacts.partner.numpy()[:number], side="right") - 1
+    wall = wall_numbers(assembly, contacts.partner.numpy()[:number])
     force = contacts.force.numpy()[:number, :3].astype(float)
     return -np.column_stack([np.bincount(wall, force[:, k], len(assembly.walls)) for k in range(3)]).astype(float)
+
+
+def wall_numbers(assembly: Assembly, partner: np.ndarray) -> np.ndarray:
+    """Numbers of the analytic walls that contacts are with, from the partners they are listed under, of the same shape."""
+    return np.searchsorted(assembly.solver.arrays.walls.numpy()["first"], partner, side="right") - 1

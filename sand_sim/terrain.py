@@ -97,7 +97,7 @@ def model_ground(boundary: Boundary, folder: Path, progress: Callable[[float], N
         mesh.vertices = mesh.vertices - place
         body = sample_body(mesh, terrain.particle_radius, progress=progress)
         if terrain.heights:
-            body = replace(body, warnings=())  # that it is an open surface goes without saying
+            body = replace(body, warnings=tuple(told for told in body.warnings if "taken for sheets" not in told))  # of course
     except (MeshError, SceneError) as error:
         raise SceneError(f"boundaries: {source} of terrain '{boundary.name}': {error}") from None
     surface = outward_triangles(body.triangles) if terrain.contact == SMOOTH else None
