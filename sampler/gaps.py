@@ -13,13 +13,14 @@ from sampler.launching import launch_shares
 from sampler.skin import Skin
 
 _WATCHED = 0.15  # places that were found so near to being a gap are looked at the next time, too, in spacings
+_PORTION = 500_000  # random places that are thrown at a time
 _STEPS = 8, 4  # from the worst places known to the worst ones near by, and trials for each
 _GAP = 0.785, 0.965  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
 _GRAVE, _WEIGHT = (0.785, 0.99), 4.0  # and from these ways on a grave one; that, and loneliness, counts so much more
 _GAPS_APART = 1.2  # gaps nearer than this to a deeper one wait, in spacings
 _ROOM, _NEAR = 0.55, 0.4  # a gap is filled so far from particles of other skins, or as far as can be so near to it; in spacings
 _LEAST, _TOO_NEAR = 0.40, 0.37  # particles nearer than this to one another are a fault, and a grave one, in spacings
-_LONELY, _BESIDE = 1.09, (0.6, 1.06)  # those farther than this from all others get a neighbour, how far beside them; in spacings
+_LONELY, _BESIDE = 1.09, (0.42, 1.06)  # those farther than this from all others get a neighbour, how far beside them; in spacings
 _MOVED, _TURNED = 1e-3, 0.999  # what has moved less, in spacings, and turned less, by the cosine, lies where it was
 _CELL = 0.6  # width of the cells of the grid that particles are found with, in spacings
 _NEAR_CELL = 0.5  # and of those with which places near particles that have moved are found
@@ -51,10 +52,10 @@ class Places:
         chosen = np.flatnonzero(which)
         return Places(*(values.take(chosen, axis=0) for values in vars(self).values()))
 
-    def joined(self, other: "Places") -> "Places":
+    def joined(self, *others: "Places") -> "Places":
         """These and others."""
-        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
-        return Places(*(np.concatenate(pair) for pair in pairs))
+        fields = zip(*(vars(places).values() for places in (self, *others)), strict=True)
+        return Places(*map(np.concatenate, fields))
 
     @property
     def excess(self) -> np.ndarray:
@@ -117,12 +118,19 @@ class Gaps:
 
     def add(self, points: np.ndarray, normals: np.ndarray, fixed: bool = False) -> None:
         """Look at more places, shape (n, 3) [m], with the normals there; for good if they are fixed, else those in doubt."""
-        self._add(self.skin.shifted(points), normals.astype(np.float32), fixed)
+        self.places = self.places.joined(self._looked_at(self.skin.shifted(points), normals.astype(np.float32), fixed))
 
-    def _add(self, points: np.ndarray, normals: np.ndarray, fixed: bool) -> None:
+    def scatter(self, number: int, random: np.random.Generator, fixed: bool = False) -> None:
+        """Look at so many random places over the area, and as many over longest edges; in portions, as memory is scarce."""
+        portions = [min(_PORTION, number - begin) for begin in range(0, number, _PORTION)]
+        scattered = (self.skin.scatter(portion, random) for portion in portions)
+        new = [self._looked_at(self.skin.shifted(points), normals.astype(np.float32), fixed) for points, normals in scattered]
+        self.places = self.places.joined(*new)
+
+    def _looked_at(self, points: np.ndarray, normals: np.ndarray, fixed: bool) -> Places:
         found = self.measure(points, normals)
         new = Places(points, normals, *found, np.full(len(points), fixed), cell_numbers(self._grid, points))
-        self.places = self.places.joined(new if fixed else new.at(new.excess > -_WATCHED))
+        return new if fixed else new.at(new.excess > -_WATCHED)
 
     def judge(self, pinned: np.ndarray, random: np.random.Generator) -> Verdict:
         """Say what is wrong; of particles too near to others those that are not pinned, shape (n,), are to blame."""
@@ -167,7 +175,7 @@ class Gaps:
     def _seek(self, random: np.random.Generator) -> None:
         """Look at the worst places near the worst ones known, too."""
         worst = [self.climb(along, _STEPS, random)[:2] for along in (False, True)]
-        self._add(*map(np.concatenate, zip(*worst, strict=True)), fixed=False)
+        self.places = self.places.joined(self._looked_at(*map(np.concatenate, zip(*worst, strict=True)), fixed=False))
 
     def _places_beside(self, which: np.ndarray):
         """Yield each of some particles and the numbers of the places beside it, if there are any."""

@@ -1,5 +1,7 @@
 """What cannot be meant, and what the user should know of particles that lie otherwise than particles of this sampler should."""
 
+import logging
+
 import numpy as np
 
 from sampler.body import Evenness
@@ -7,12 +9,14 @@ from sampler.errors import MeshError
 from sampler.surface import Surface
 
 MOST = 2_000_000  # particles, more are not meant
+_LONG = 200_000  # particles take so long that it is told before
 _BURIED = 10.0  # times as large as what can be touched, at most, is all of a surface that is worth cutting
 _HUGE = 1000.0  # particles of so many diagonals are not meant
 _FINE = 1e-5  # nor are particles so much finer than the diagonal, which single precision would not place within their radius
 _MOST = {"variation": 0.10, "farthest": 1.10, "coverage": 1.0, "skin_coverage": 1.10}  # beyond what hard meshes need
 _LEAST = {"nearest": 0.30}
 _OFF = 0.01  # share by which the number of particles may differ from the wanted one
+_FEWER = "check the mesh's scale (0.001 for millimetres), or take larger particles"
 _LARGE = 0.5  # radius from which particles are large, in diagonals of the mesh
 
 
@@ -43,6 +47,10 @@ def check_scale(triangles: np.ndarray, radius: float, spacing: float) -> None:
         number = 2.0 / np.sqrt(3.0) * (np.sqrt(area) / np.float64(spacing)) ** 2
     if number > _BURIED * MOST:
         raise too_many(area, number, radius)
+    if number > _LONG:
+        logging.getLogger(__name__).warning(
+            "about %.2g particles on %.3g m^2 take minutes; if so many are not meant, %s", number, area, _FEWER
+        )
 
 
 def check_thickness(thickness: float, radius: float, size: float) -> None:
@@ -57,10 +65,7 @@ def check_thickness(thickness: float, radius: float, size: float) -> None:
 
 def too_many(area: float, number: float, radius: float) -> MeshError:
     """What to say of an area [m^2] that would need too many particles of a radius [m]."""
-    return MeshError(
-        f"a surface of {area:.3g} m^2 would need {number:.2g} particles of radius {radius:.3g} m; "
-        "check the mesh's scale (0.001 for millimetres), or take larger particles"
-    )
+    return MeshError(f"a surface of {area:.3g} m^2 would need {number:.2g} particles of radius {radius:.3g} m; {_FEWER}")
 
 
 def broken_limits(evenness: Evenness, number: int, wanted: int, radius: float, size: float) -> list[str]:

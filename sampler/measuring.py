@@ -8,6 +8,7 @@ from sampler.lattice import lattice_spacing
 from sampler.skin import Skin
 
 _MEASURED = 50  # places per particle, over the area, and as many over the edges
+_MANY = 10_000  # of so many particles, only places that may be among the worst are kept in mind
 _SURVEYED = 5000  # of the places that have none near, so many are asked where it is
 _STEPS = 16, 8  # from the worst of them to the worst ones near by, and trials for each
 
@@ -20,8 +21,8 @@ def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Eve
     gaps = Gaps(skin, lattice_spacing(float(skin.areas.sum()), len(points)))
     gaps.look(points, normals)
     random, most = np.random.default_rng(1), 2.0 * skin.unit / gaps.spacing
-    for places in (skin.scatter(_MEASURED * len(points), random), skin.corners(gaps.spacing)):
-        gaps.add(*places, fixed=True)
+    gaps.scatter(_MEASURED * len(points), random, fixed=len(points) < _MANY)
+    gaps.add(*skin.corners(gaps.spacing), fixed=True)
     worst = [_worst_place(gaps, along, most, random) for along in (False, True)]
     nearest = gaps.neighbour_distances(most) if len(points) > 1 else np.full(1, np.inf)
     variation = nearest.std() / nearest.mean() if len(points) > 1 and nearest.any() else 0.0

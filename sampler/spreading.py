@@ -72,10 +72,10 @@ def spread_particles(
         gaps.look(*found)
         if turn == 0:
             gaps.add(*skin.corners(state.spacing), fixed=True)
-            gaps.add(*skin.scatter(_SAMPLED * number, random), fixed=True)
+            gaps.scatter(_SAMPLED * number, random, fixed=True)
         verdict = gaps.judge(state.pinned, random)
         if looks < _LOOKS and verdict.fault < (_FINE if looks else _HARDLY):  # a gap on a small piece may have had no place
-            gaps.add(*skin.scatter(_CONFIRMED * number, random))
+            gaps.scatter(_CONFIRMED * number, random)
             verdict = gaps.judge(state.pinned, random)
             looks, least = looks + 1, np.inf  # what was found before had not been looked at so closely
         stuck = 0 if verdict.fault < least else stuck + 1

@@ -73,6 +73,33 @@ def test_the_worst_gap_is_found_from_few_places(seed):
     assert np.linalg.norm(verdict.points[0] - missing) < 0.03 * gaps.spacing
 
 
+@pytest.mark.parametrize("radius", [0.48, 0.9])
+def test_a_particle_alone_on_a_small_piece_gets_a_neighbour(radius):
+    """However small, if there is room on it for two; as far from it as the piece allows, and no farther than a spacing."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 65)
+    rim, middle = radius * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn]), np.zeros((1, 3))
+    disc = np.stack([np.broadcast_to(middle, (64, 3)), rim[:-1], rim[1:]], axis=1)
+    gaps = Gaps(Skin(disc), 1.0)
+    gaps.look(middle, np.array([[0.0, 0.0, 1.0]]))
+    gaps.scatter(200, np.random.default_rng(0), fixed=True)
+    verdict = gaps.judge(np.zeros(1, bool), np.random.default_rng(0))
+    assert np.linalg.norm(verdict.points[0]) == pytest.approx(radius, abs=0.05)
+
+
+@pytest.mark.parametrize("portion", [500_000, 700])
+def test_random_places_are_thrown_in_portions(monkeypatch, portion):
+    monkeypatch.setattr("sampler.gaps._PORTION", portion)
+    gaps, (points, up) = plane_gaps(50), scatter(np.random.default_rng(4), 50)
+    gaps.look(points, up)
+    for fixed in (True, False):
+        gaps.scatter(2000, np.random.default_rng(5), fixed)
+    places = gaps.places
+    assert np.count_nonzero(places.fixed) == 2 * 2000
+    assert np.all(places.excess[~places.fixed] > -0.15) and 0 < np.count_nonzero(~places.fixed) < 4000
+    first = np.linalg.norm(gaps.skin.back(places.points)[:, None] - points, axis=2).min(axis=1) / gaps.spacing
+    assert places.closest["way"] == pytest.approx(np.minimum(first, 2.0), abs=1e-5)
+
+
 def test_particles_are_found_however_far_they_are_scattered():
     """In far more cells than there may be, so in wider ones."""
     random = np.random.default_rng(3)

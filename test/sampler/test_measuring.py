@@ -6,6 +6,7 @@ import trimesh
 from spread import distances, neighbours, worst_on_a_box
 
 from sampler import MeshError, sample_body
+from sampler.limits import check_scale
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -16,6 +17,15 @@ def test_the_worst_place_is_found(seed):
     assert body.coverage == pytest.approx(worst, rel=2e-3)
     assert body.smallest_grain == pytest.approx(worst - 0.002, abs=2e-3 * worst)
     assert body.evenness.skin_coverage >= body.evenness.coverage
+
+
+def test_the_worst_place_is_found_among_those_kept_in_mind(monkeypatch):
+    """Of many particles not all places are, and they are thrown in portions."""
+    monkeypatch.setattr("sampler.measuring._MANY", 0)
+    monkeypatch.setattr("sampler.gaps._PORTION", 4000)
+    extents = (0.1, 0.07, 0.05)
+    body = sample_body(trimesh.creation.box(extents), radius=0.002, count=300)
+    assert body.coverage == pytest.approx(worst_on_a_box(extents, body.points), rel=2e-3)
 
 
 def test_however_far_the_worst_place_is():
@@ -43,3 +53,11 @@ def test_what_lies_otherwise_than_it_should_is_told():
 def test_what_a_single_particle_leaves_open_is_told():
     assert "coverage" in sample_body(trimesh.creation.box((12.0, 1.0, 1.0)), radius=0.4, count=1).warnings[-1]
     assert not sample_body(trimesh.creation.box((2.0, 1.0, 1.0)), radius=0.4, count=1).warnings
+
+
+def test_what_will_take_minutes_is_told_before(caplog):
+    cube = trimesh.creation.box((100.0, 100.0, 100.0)).triangles  # in millimetres, taken for metres
+    check_scale(cube, 0.4, 0.6)
+    assert not caplog.messages
+    check_scale(cube, 0.2, 0.3)
+    assert "about 7.7e+05 particles on 6e+04 m^2 take minutes" in caplog.text and "0.001 for millimetres" in caplog.text
