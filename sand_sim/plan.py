@@ -15,7 +15,7 @@ from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.survey import list_kernels
 from sand_sim.grain_table import GrainTable
 from sand_sim.integrator import VERLET
-from sand_sim.scene.checking import unused_numbers
+from sand_sim.scene.checking import odd_numbers, unused_numbers
 from sand_sim.scene.clumps import place_clumps
 from sand_sim.scene.shapes import tetrahedron
 
@@ -34,6 +34,7 @@ class Plan:
         tools, terrains: by name, whether grains touch their particles (``rough``) or their true surfaces (``smooth``).
         meshes: what the sampler had to mend or guess in the meshes of tools, terrains and bodies, where it had to.
         unused: what the scene gives for contact laws that it has not chosen.
+        odd: numbers that are more likely in another unit.
         left_out: what is neither compiled nor allocated, with the reason.
         kernels: names of the compiled kernels.
         arrays: bytes by array.
@@ -51,6 +52,7 @@ class Plan:
     terrains: dict[str, str]
     meshes: dict[str, tuple[str, ...]]
     unused: list[str]
+    odd: list[str]
     left_out: dict[str, str]
     kernels: list[str]
     arrays: dict[str, int]
@@ -86,6 +88,7 @@ def make_plan(assembly: Assembly, measure: bool = True, check: Callable[[], None
         terrains={wall.name: wall.terrain.contact for wall in scene.boundaries if wall.terrain},
         meshes=assembly.mesh_warnings,
         unused=unused_numbers(scene),
+        odd=odd_numbers(scene),
         left_out=left_out(assembly),
         kernels=sorted(one.key.rsplit("__", 1)[-1] for one in list_kernels(arrays, solver.stages, solver.device)),
         arrays=sizes,

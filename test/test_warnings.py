@@ -85,6 +85,11 @@ def test_a_run_and_a_plan_tell_before_it_begins(tmp_path, capsys):
     assert main(["plan", str(path), "--no-measure"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[lines.index("without effect") + 1].startswith("  liquid: has no effect")
+    assert "numbers that may be in another unit" not in lines
+    light = {name: {"density": density, "young": 1e7, "poisson": 0.25} for name, density in (("sand", 2.6), ("steel", 7800.0))}
+    assert main(["plan", str(write_small_scene(tmp_path, materials=light)), "--no-measure"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[lines.index("numbers that may be in another unit") + 1].endswith("is it in g/cm^3?")
 
 
 def test_a_world_refuses_a_velocity_and_says_what_it_takes(tmp_path):

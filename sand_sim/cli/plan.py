@@ -47,6 +47,7 @@ def plan_text(plan: Plan) -> str:
     lines += ["", "meshes: what had to be mended or guessed"] if plan.meshes else []
     lines += [f"  {name:32} {what}" for name, told in plan.meshes.items() for what in told]
     lines += ["", "without effect", *(f"  {what}" for what in plan.unused)] if plan.unused else []
+    lines += ["", "numbers that may be in another unit", *(f"  {what}" for what in plan.odd)] if plan.odd else []
     lines += ["", "left out: no code compiled, no memory taken"]
     lines += [f"  {name:32} {why}" for name, why in plan.left_out.items()]
     lines += ["", f"arrays: {plan.bytes_per_sphere:.0f} bytes per sphere, {sum(plan.arrays.values()) / 1e6:.1f} MB in all"]

@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--duration", type=positive, help="simulated seconds; the scene's own if left out")
     parser.add_argument("--threads", type=count, help="cores to use; all if left out")
     parser.add_argument("--checkpoint", type=Path, metavar="FOLDER", help="keep the state there, so that a crash loses little")
-    parser.add_argument("--checkpoint-period", type=float, default=PERIOD, metavar="S", help=f"wall seconds, default {PERIOD:g}")
+    parser.add_argument("--checkpoint-period", type=float, metavar="S", help=f"wall seconds, default {PERIOD:g}")
     parser.add_argument("--resume", action="store_true", help="go on from the newest good checkpoint in that folder")
     parser.add_argument("--view", action="store_true", help="open the Rerun viewer")
     parser.add_argument("--particles", action="store_true", help="draw the particles of tools in Rerun")
@@ -50,9 +50,12 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
 
     checkpoints = None
     if options.checkpoint:
-        checkpoints = CheckpointFolder(options.checkpoint, scene.name, options.checkpoint_period, console.tell)
+        period = PERIOD if options.checkpoint_period is None else options.checkpoint_period
+        checkpoints = CheckpointFolder(options.checkpoint, scene.name, period, console.tell)
     elif options.resume:
         raise CheckpointError("--resume: give the folder to resume from with --checkpoint FOLDER")
+    elif options.checkpoint_period is not None:
+        raise CheckpointError("--checkpoint-period: give the folder for checkpoints with --checkpoint FOLDER")
     world = World(scene, progress)
     log = RunLog(scene)
     if options.resume:

@@ -28,12 +28,13 @@ class Diagnosis:
         self._lag, self._strays = LagWatch(simulation, warn), StrayWatch(simulation.world, warn)
         self._before = (time.monotonic(), 0.0)
 
-    def tell(self, last: Observation, dropped: int) -> DiagnosticArray:
+    def tell(self, last: Observation, dropped: int, unwritten: list[str]) -> DiagnosticArray:
         """The state of things.
 
         Args:
             last: what was shown last.
             dropped: clouds that were not told for want of time.
+            unwritten: files that cannot be written, and why.
         """
         simulation = self._simulation
         rejected = dict(simulation.rejected)
@@ -51,9 +52,9 @@ class Diagnosis:
         device = simulation.world.assembly.solver.device.label
         state = "paused" if simulation.paused else "running"
         message = health_to_diagnostics(last.health, last.time, f"{self._name}: world", device, further, state)
-        status, lag = message.status[0], self._lag.look(last.time)
-        if lag:
-            status.message = lag if status.level == DiagnosticStatus.OK else f"{status.message}; {lag}"
+        status = message.status[0]
+        for trouble in filter(None, (self._lag.look(last.time), *unwritten)):
+            status.message = trouble if status.level == DiagnosticStatus.OK else f"{status.message}; {trouble}"
             status.level = DiagnosticStatus.WARN
         if simulation.fault is not None:
             status.level = DiagnosticStatus.ERROR

@@ -292,7 +292,7 @@ class SandSimNode(LifecycleNode):
     def _diagnose(self) -> None:
         if self._last is None:
             return
-        self._diagnostics.publish(self._diagnosis.tell(self._last, self._bed.dropped))
+        self._diagnostics.publish(self._diagnosis.tell(self._last, self._bed.dropped, self.recorder.troubles))
         self._watch.look()
         # Whoever comes while nothing moves still sees where it stands.
         if self.simulation.fault is not None:

@@ -61,6 +61,11 @@ class Recorder:
         except OSError as error:  # told now, not after hours
             report(f"{output} cannot be made: {error.strerror or error}; summary and history are tried again in the end")
 
+    @property
+    def troubles(self) -> list[str]:
+        """Sinks that fail now, and why."""
+        return [f"{name}: {sink.trouble}" for name, sink in self._sinks.items() if sink.trouble]
+
     def write(self, observation: Observation) -> None:
         """Add one observation to all sinks; time zero begins a new history."""
         if observation.steps == 0:

@@ -133,6 +133,7 @@ def test_refusals(tmp_path):
     run(tmp_path, scene, "some")
     for words, reason in (
         (["--resume"], "--checkpoint FOLDER"),
+        (["--checkpoint-period", "5"], "--checkpoint-period: give the folder for checkpoints with --checkpoint FOLDER"),
         (["--checkpoint", "small.yaml"], "checkpoint folder small.yaml: File exists"),
         (["--checkpoint", "some_states", "--checkpoint-period", "-1"], "period of checkpoints: must be 0 s or more"),
     ):

@@ -23,6 +23,17 @@ from sand_sim import load_scene
 from sand_sim.playing import commands_at, frame_times
 
 
+def test_a_recording_that_cannot_be_written_is_told_on_diagnostics(client, start_node, tmp_path):
+    blocked = tmp_path / "out"
+    blocked.touch()
+    start_node(pacing="fast", recording=str(blocked / "run.rrd"))
+    client.connect()
+    client.wait_for(lambda: client.diagnostics and "run.rrd: " in client.diagnostics[-1].status[0].message)
+    assert client.diagnostics[-1].status[0].level == DiagnosticStatus.WARN
+    blocked.unlink()
+    client.wait_for(lambda: "run.rrd" not in client.diagnostics[-1].status[0].message)
+
+
 def test_poses_in_wrench_and_cloud_out(client, start_node):
     node = start_node(pacing="lockstep")
     client.connect()
