@@ -137,6 +137,27 @@ def test_laws_have_source_and_test(slot, name):
     assert name == getattr(ContactModel(), slot) or f'"{slot}": "{name}"' in tests
 
 
+def calls_without_device(path):
+    """Lines that leave it to Warp where an array lies or a kernel runs; ``wp.array(dtype=int)`` is a type."""
+    for call in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(call, ast.Call) and re.fullmatch(rf"wp\.({PLACED})", ast.unparse(call.func)):
+            names = {keyword.arg for keyword in call.keywords}
+            is_type = call.func.attr.startswith("array") and not call.args and names <= {"dtype", "ndim"}
+            if "device" not in names and not is_type:
+                yield call.lineno
+
+
+PLACED = "array|array2d|zeros|ones|full|empty|launch|launch_tiled|from_numpy|HashGrid|Volume|ScopedCapture|capture_begin"
+
+
+@pytest.mark.parametrize("folder", [*PACKAGES, "benchmarks", "test"])
+def test_everything_says_which_device_it_is_on(folder):
+    """Where there is a GPU Warp takes that, also for what a scene on the CPU needs; a CPU kernel that is given it crashes."""
+    found = {path: list(calls_without_device(path)) for path in (ROOT / folder).rglob("*.py")}
+    assert found
+    assert not {path: lines for path, lines in found.items() if lines}
+
+
 def test_tests_share_by_support_alone():
     for path in (ROOT / "test").rglob("test_*.py"):
         assert not [name for name in imports(path) if name.startswith("test_")], path

@@ -17,7 +17,8 @@ GPU = pytest.mark.skipif(not wp.is_cuda_available(), reason="needs an NVIDIA GPU
 
 @pytest.fixture(params=["stand-in", pytest.param("cuda", marks=GPU)])
 def device(request, monkeypatch):
-    """Scenes with this ``solver.device`` run on a GPU, or on its stand-in."""
+    """Scenes with this ``solver.device`` run on a GPU, or on its stand-in, which has all arrays that it works on."""
+    monkeypatch.setattr(wp.config, "launch_array_access_mode", wp.config.LaunchArrayAccessMode.STRICT)
     if request.param == "stand-in":
         stand_in = ManyThreads(threads=500, shares=64)
         choose = lambda name, threads: stand_in if name == "cuda" else open_device(name, threads)  # noqa: E731

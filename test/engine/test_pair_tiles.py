@@ -55,26 +55,26 @@ def test_many_at_once_give_what_one_gives(name):
         setattr(table, field, random.uniform(0.1, 1.0) * (1e6 if "young" in field or field == "shear" else 1.0))
     kept = random.normal(size=(pairs, memory._length_)) * random.choice([0.0, 1e-8, 1e-5], pairs)[:, None]
     given = [
-        wp.array(np.array([0, pairs], np.int32), dtype=int),
+        wp.array(np.array([0, pairs], np.int32), dtype=int, device="cpu"),
         1,
-        wp.array(np.arange(pairs, dtype=np.int32), dtype=int),
-        wp.array(np.arange(pairs, 2 * pairs, dtype=np.int32), dtype=int),
-        wp.array(place, dtype=precision.whole4),
-        wp.array(four["motion"], dtype=precision.vec4),
-        wp.array(four["spin"], dtype=precision.vec4),
-        wp.array(moving["half_motion"].astype(real), dtype=precision.vec3),
-        wp.array(moving["half_spin"].astype(real), dtype=precision.vec3),
-        wp.zeros(2 * pairs, dtype=int),
-        wp.array([table], dtype=recipe.contact.types(precision).pair),
+        wp.array(np.arange(pairs, dtype=np.int32), dtype=int, device="cpu"),
+        wp.array(np.arange(pairs, 2 * pairs, dtype=np.int32), dtype=int, device="cpu"),
+        wp.array(place, dtype=precision.whole4, device="cpu"),
+        wp.array(four["motion"], dtype=precision.vec4, device="cpu"),
+        wp.array(four["spin"], dtype=precision.vec4, device="cpu"),
+        wp.array(moving["half_motion"].astype(real), dtype=precision.vec3, device="cpu"),
+        wp.array(moving["half_spin"].astype(real), dtype=precision.vec3, device="cpu"),
+        wp.zeros(2 * pairs, dtype=int, device="cpu"),
+        wp.array([table], dtype=recipe.contact.types(precision).pair, device="cpu"),
         1,
         quantum,
         1e-5,
     ]
 
     def results(build):
-        remembered = wp.array(kept.astype(real), dtype=memory)
-        force, couple, moment = (wp.zeros(pairs, dtype=precision.vec4) for _ in range(3))
-        deepest, energy = wp.zeros(1, dtype=precision.real), wp.zeros(1, dtype=precision.real)
+        remembered = wp.array(kept.astype(real), dtype=memory, device="cpu")
+        force, couple, moment = (wp.zeros(pairs, dtype=precision.vec4, device="cpu") for _ in range(3))
+        deepest, energy = (wp.zeros(1, dtype=precision.real, device="cpu") for _ in range(2))
         wp.launch(build(recipe), 1, [0, *given, remembered, force, couple, moment, deepest, energy], device="cpu")
         return [array.numpy() for array in (force, couple, moment, remembered, deepest)]
 
