@@ -93,7 +93,7 @@ class DemArrays:
         self.felt_force = self.felt_torque = None
         if self.bodies:
             self.felt_force, self.felt_torque = (wp.zeros(number, dtype=precision.vec3, device=device) for _ in range(2))
-            self.body_energy = wp.zeros(1, dtype=wp.vec3d, device=device)
+            self.body_energy = wp.zeros(energy.blocks_for(self.bodies.count.capacity), dtype=wp.vec3d, device=device)
         self.kinds = len(pairs)
         rows = [pair for row in pairs for pair in row]
         self.pairs = wp.array(rows, dtype=recipe.contact.types(precision).pair, device=device)

@@ -77,11 +77,13 @@ def build_grain_energy(recipe: Recipe) -> wp.Kernel:
 
 @cache
 def build_body_energy(precision: Precision) -> wp.Kernel:
-    """Kernel for energies of rigid bodies: ``blocks`` holds translation, rotation and height [J]; one thread takes all."""
+    """Kernel for energies of rigid bodies: ``blocks`` holds translation, rotation and height [J]."""
     real, whole, vec3, vec4, whole4 = precision.real, precision.whole, precision.vec3, precision.vec4, precision.whole4
 
     @kernel
     def body_energy(
+        lane: int,
+        shares: int,
         bodies: int,
         place: wp.array(dtype=whole4),
         motion: wp.array(dtype=vec4),
@@ -93,19 +95,23 @@ def build_body_energy(precision: Precision) -> wp.Kernel:
         quantum: real,
         blocks: wp.array(dtype=wp.vec3d),
     ):
-        total = wp.vec3d(wp.float64(0.0))
-        for b in range(bodies):
-            here = place[b]
-            if here[3] > whole(0):
-                mass = wp.float64(motion[b][3])
-                omega = wp.quat_rotate_inv(turn[b], spin[b])
-                height = -wp.dot(gravity, vec3(real(here[0]), real(here[1]), real(here[2])) * quantum)
-                total += wp.vec3d(
-                    wp.float64(0.5) * mass * wp.dot(velocity[b], velocity[b]),
-                    wp.float64(0.5) * wp.dot(wp.cw_mul(inertia[b], omega), omega),
-                    mass * wp.float64(height),
-                )
-        blocks[0] = total
+        own = lane + wp.tid()
+        number = (bodies + wp.static(BLOCK) - 1) // wp.static(BLOCK)
+        for block in range(part_start(number, own, shares), part_start(number, own + 1, shares)):
+            total = wp.vec3d(wp.float64(0.0))
+            first = block * wp.static(BLOCK)
+            for b in range(first, wp.min(first + wp.static(BLOCK), bodies)):
+                here = place[b]
+                if here[3] > whole(0):
+                    mass = wp.float64(motion[b][3])
+                    omega = wp.quat_rotate_inv(turn[b], spin[b])
+                    height = -wp.dot(gravity, vec3(real(here[0]), real(here[1]), real(here[2])) * quantum)
+                    total += wp.vec3d(
+                        wp.float64(0.5) * mass * wp.dot(velocity[b], velocity[b]),
+                        wp.float64(0.5) * wp.dot(wp.cw_mul(inertia[b], omega), omega),
+                        mass * wp.float64(height),
+                    )
+            blocks[block] = total
 
     return body_energy
 

@@ -125,7 +125,7 @@ class ExplicitDem:
         grains = arrays.grain_blocks.numpy()[: blocks_for(arrays.grains.active.get())]
         energies = grains.sum(axis=0)
         if arrays.bodies:
-            energies = energies + arrays.body_energy.numpy()[0]
+            energies = energies + arrays.body_energy.numpy().sum(axis=0)
         translation, rotation, height = energies
         contacts = np.zeros(2)
         for name, listed in arrays.lists.items():

@@ -52,4 +52,4 @@ def _see_bodies(arrays: DemArrays, recorder) -> None:
     recorder.each(body_motion.build_see_bodies(arrays.recipe), bodies.count, inputs)
     inputs = [bodies.count.capacity, bodies.place, bodies.motion, bodies.seen_velocity, bodies.seen_spin]
     inputs += [bodies.turn, bodies.inertia, gravity, quantum, arrays.body_energy]
-    recorder.once(energy.build_body_energy(precision), inputs)
+    recorder.share(energy.build_body_energy(precision), inputs)
