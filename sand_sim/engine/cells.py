@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import warp as wp
 
-from sand_sim.engine.count import Count, count_of, share_out, share_start
+from sand_sim.engine.count import GROUP, Count, count_of, share_out, share_start
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.lattice import Lattice
 from sand_sim.precision import Precision
@@ -47,7 +47,8 @@ class Cells:
     Attributes:
         levels: array of ``Level``, shape (levels,).
         low: lower corner of the grid, whole3, shape (1,) [quantum].
-        corners: lower and upper corner of each share of the grains, whole3, shape (shares, 2) [quantum].
+        corners: lower and upper corner of each share of the grains, then of each group of shares in the place of its first,
+            whole3, shape (shares, 2) [quantum].
         bins: keys in use, one more than there are cells; retired grains get the last.
     """
 
@@ -116,6 +117,26 @@ def build_find_corners(precision: Precision) -> wp.Kernel:
 
 
 @cache
+def build_join_corners(precision: Precision) -> wp.Kernel:
+    """Kernel for the bounding box of each group of shares."""
+    whole3 = precision.whole3
+
+    @kernel
+    def join_corners(lane: int, shares: int, corners: wp.array2d(dtype=whole3)):
+        first = wp.static(GROUP) * (lane + wp.tid())
+        if first < shares:
+            low = corners[first, 0]
+            high = corners[first, 1]
+            for one in range(first + 1, wp.min(first + wp.static(GROUP), shares)):
+                low = wp.min(low, corners[one, 0])
+                high = wp.max(high, corners[one, 1])
+            corners[first, 0] = low
+            corners[first, 1] = high
+
+    return join_corners
+
+
+@cache
 def build_lay_cells(precision: Precision) -> wp.Kernel:
     """Kernel, one thread, that lays all levels over the bounding box; cells grow where they would outnumber their room."""
     real, vec3, whole3 = precision.real, precision.vec3, precision.whole3
@@ -131,9 +152,9 @@ def build_lay_cells(precision: Precision) -> wp.Kernel:
     ):
         lowest = corners[0, 0]
         highest = corners[0, 1]
-        for share_of in range(1, corners.shape[0]):
-            lowest = wp.min(lowest, corners[share_of, 0])
-            highest = wp.max(highest, corners[share_of, 1])
+        for group in range(wp.static(GROUP), corners.shape[0], wp.static(GROUP)):
+            lowest = wp.min(lowest, corners[group, 0])
+            highest = wp.max(highest, corners[group, 1])
         low[0] = lowest
         span = vec3(real(highest[0] - lowest[0]), real(highest[1] - lowest[1]), real(highest[2] - lowest[2]))
         fast = int(0)

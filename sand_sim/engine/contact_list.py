@@ -14,7 +14,7 @@ from sand_sim.engine.count import Count, count_of, share_out
 from sand_sim.engine.flags import FAULT_ROOM, Flags
 from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.recipe import Recipe
-from sand_sim.engine.sorting import record_running_totals
+from sand_sim.engine.sorting import record_running_totals, totals_of
 
 
 class ContactList:
@@ -40,7 +40,7 @@ class ContactList:
         self.recipe, self.device = recipe, on.name
         device = on.name
         self.pairs = Count(0, on.lanes, device)
-        self.totals, self.starts = wp.zeros(on.shares, dtype=int, device=device), wp.zeros(grains + 1, dtype=int, device=device)
+        self.totals, self.starts = totals_of(on), wp.zeros(grains + 1, dtype=int, device=device)
         self.counts = self.new_starts = self.old_starts = None
         self.wanted = wp.zeros(1, dtype=int, device=device)
         self.partner = self.memory = None

@@ -3,6 +3,7 @@
 import warp as wp
 
 _ALIGNMENT = 16  # items per shared cache line, so that two cores never write to the same line
+GROUP = 64  # shares that are summed up together first: a GPU has thousands, and a thread walks through them one after another
 
 
 class Count:

@@ -10,7 +10,7 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.engine.count import count_of
+from sand_sim.engine.count import count_of, part_start
 from sand_sim.engine.kernel import kernel, sure
 from sand_sim.precision import Precision
 
@@ -31,6 +31,7 @@ class Skin:
         lifetime: steps that the lists shall last for, float64, shape (1,).
         pace: factor from how far a grain has moved to what it is allowed, and the least, float64, shape (2,) [1], [quantum].
         renewed_at: step at which the lists were made, int64, shape (1,).
+        travel: how far grains have moved since, of those that are looked at, float64, shape (2 samples,) [quantum].
     """
 
     def __init__(self, widest: float, radius: float, device: str):
@@ -39,50 +40,75 @@ class Skin:
         self.lifetime = wp.full(1, _FIRST_LIFETIME, dtype=wp.float64, device=device)
         self.pace = wp.zeros(2, dtype=wp.float64, device=device)
         self.renewed_at = wp.zeros(1, dtype=wp.int64, device=device)
+        self.travel = wp.zeros(2 * _SAMPLES, dtype=wp.float64, device=device)
+
+
+@wp.func
+def look_at_every(number: int) -> int:
+    """Of how many grains one is looked at."""
+    return wp.max(number / wp.static(_SAMPLES), 1)
 
 
 @cache
-def build_set_pace(precision: Precision) -> wp.Kernel:
-    """Kernel that chooses how long the lists about to be made shall last."""
+def build_note_travel(precision: Precision) -> wp.Kernel:
+    """Kernel that notes how far some grains have moved, at most what they are allowed.
+
+    They lie all over memory, which a thread that looked at all of them would have to wait for each time.
+    """
     whole4 = precision.whole4
 
     @kernel
-    def set_pace(
+    def note_travel(
+        lane: int,
+        shares: int,
         spans: wp.array(dtype=int),
         place: wp.array(dtype=whole4),
         origin: wp.array(dtype=whole4),
         came_from: wp.array(dtype=int),
-        radius: wp.float64,
         widest: wp.array(dtype=wp.float64),
-        steps_done: wp.array(dtype=wp.int64),
-        renewed_at: wp.array(dtype=wp.int64),
-        lifetime: wp.array(dtype=wp.float64),
-        pace: wp.array(dtype=wp.float64),
+        travel: wp.array(dtype=wp.float64),
     ):
-        steps = steps_done[0] - renewed_at[0]
-        most = wp.float64(0.5) * widest[0]
-        pace[0] = wp.float64(0.0)
-        if radius == wp.float64(0.0):
-            pace[1] = most
-        elif steps <= wp.int64(0):
-            pace[1] = wp.float64(wp.static(_FIRST)) * most
-        else:
-            number = count_of(spans)
-            every = wp.max(number / wp.static(_SAMPLES), 1)
-            travel = wp.float64(0.0)
-            for k in range(number / every):
-                i = k * every
-                here = place[i]
-                was = origin[came_from[i]]
-                moved = wp.vec3d(wp.float64(here[0] - was[0]), wp.float64(here[1] - was[1]), wp.float64(here[2] - was[2]))
-                travel += wp.min(wp.length(moved), most)
-            travel = travel / (wp.float64(wp.max(number / every, 1)) * wp.float64(steps))
-            best = wp.sqrt(wp.float64(wp.static(0.5 * _SEARCH / _SPARE)) * radius / wp.max(travel, wp.float64(1.0e-12)))
-            lifetime[0] = best
-            pace[0] = wp.float64(wp.static(_SPARE)) * best / wp.float64(steps)
-            pace[1] = wp.float64(wp.static(_LEAST)) * most
+        own = lane + wp.tid()
+        every = look_at_every(count_of(spans))
+        samples = count_of(spans) / every
+        for k in range(part_start(samples, own, shares), part_start(samples, own + 1, shares)):
+            here = place[k * every]
+            was = origin[came_from[k * every]]
+            moved = wp.vec3d(wp.float64(here[0] - was[0]), wp.float64(here[1] - was[1]), wp.float64(here[2] - was[2]))
+            travel[k] = wp.min(wp.length(moved), wp.float64(0.5) * widest[0])
 
-    return set_pace
+    return note_travel
+
+
+@kernel
+def set_pace(
+    spans: wp.array(dtype=int),
+    travel: wp.array(dtype=wp.float64),
+    radius: wp.float64,
+    widest: wp.array(dtype=wp.float64),
+    steps_done: wp.array(dtype=wp.int64),
+    renewed_at: wp.array(dtype=wp.int64),
+    lifetime: wp.array(dtype=wp.float64),
+    pace: wp.array(dtype=wp.float64),
+):
+    """Choose how long the lists about to be made shall last."""
+    steps = steps_done[0] - renewed_at[0]
+    most = wp.float64(0.5) * widest[0]
+    pace[0] = wp.float64(0.0)
+    if radius == wp.float64(0.0):
+        pace[1] = most
+    elif steps <= wp.int64(0):
+        pace[1] = wp.float64(wp.static(_FIRST)) * most
+    else:
+        samples = count_of(spans) / look_at_every(count_of(spans))
+        mean = wp.float64(0.0)
+        for k in range(samples):
+            mean += travel[k]
+        mean = mean / (wp.float64(wp.max(samples, 1)) * wp.float64(steps))
+        best = wp.sqrt(wp.float64(wp.static(0.5 * _SEARCH / _SPARE)) * radius / wp.max(mean, wp.float64(1.0e-12)))
+        lifetime[0] = best
+        pace[0] = wp.float64(wp.static(_SPARE)) * best / wp.float64(steps)
+        pace[1] = wp.float64(wp.static(_LEAST)) * most
 
 
 @cache

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from sand_sim.engine.count import Count, count_of, part_start, share_start
+from sand_sim.engine.count import GROUP, Count, count_of, part_start, share_start
 from sand_sim.engine.kernel import kernel
 
 
@@ -20,7 +20,7 @@ class SortedItems:
         starts: int array, shape (keys + 1,).
         order: int array, shape (item capacity,).
         cursor: int scratch, shape (keys,).
-        totals: int scratch, shape (shares,).
+        totals: scratch from ``totals_of``.
     """
 
     starts: wp.array
@@ -31,7 +31,12 @@ class SortedItems:
     @classmethod
     def allocate(cls, keys: int, items: int, on) -> "SortedItems":
         """Room on a device for ``items`` items with keys below ``keys``."""
-        return cls(*(wp.zeros(size, dtype=int, device=on.name) for size in (keys + 1, items, keys, on.shares)))
+        return cls(*(wp.zeros(size, dtype=int, device=on.name) for size in (keys + 1, items, keys)), totals_of(on))
+
+
+def totals_of(on) -> wp.array:
+    """Scratch for totals of the shares of a device and, behind them, of their groups, int, shape (shares + groups,)."""
+    return wp.zeros(on.shares + -(-on.shares // GROUP), dtype=int, device=on.name)
 
 
 @kernel
@@ -168,6 +173,17 @@ def total_share(lane: int, shares: int, counts: wp.array(dtype=int), spans: wp.a
 
 
 @kernel
+def total_group(lane: int, shares: int, totals: wp.array(dtype=int)):
+    """Sum of the totals of a group of shares."""
+    own = lane + wp.tid()
+    total = int(0)
+    for share in range(wp.static(GROUP) * own, wp.min(wp.static(GROUP) * (own + 1), shares)):
+        total += totals[share]
+    if wp.static(GROUP) * own < shares:
+        totals[shares + own] = total
+
+
+@kernel
 def running_totals(
     lane: int,
     shares: int,
@@ -180,7 +196,10 @@ def running_totals(
     own = lane + wp.tid()
     items = count_of(spans)
     start = int(0)
-    for before in range(own):
+    group = own / wp.static(GROUP)
+    for before in range(group):
+        start += totals[shares + before]
+    for before in range(wp.static(GROUP) * group, own):
         start += totals[before]
     for item in range(share_start(items, own, shares), share_start(items, own + 1, shares)):
         number = counts[item]
@@ -215,4 +234,5 @@ def record_sort(recorder, keys: wp.array, bins: Count, items: Count, result: Sor
 def record_running_totals(recorder, counts: wp.array, items: Count, totals: wp.array, starts: wp.array) -> None:
     """Exclusive running totals: ``starts[i] = counts[0] + ... + counts[i - 1]``, shape (items + 1,)."""
     recorder.share(total_share, [counts, items.spans, totals])
+    recorder.share(total_group, [totals])
     recorder.share(running_totals, [counts, items.spans, totals, starts])

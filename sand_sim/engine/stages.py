@@ -18,10 +18,10 @@ from sand_sim.engine import (
     tool_contacts,
 )
 from sand_sim.engine.arrays import DemArrays
-from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_lay_cells
+from sand_sim.engine.cells import build_cell_keys, build_find_corners, build_join_corners, build_lay_cells
 from sand_sim.engine.chunks import CHUNK
 from sand_sim.engine.contact_list import ContactList, record_count, record_fill
-from sand_sim.engine.skin import begin_lifetime, build_allow, build_remember, build_set_pace, end_lifetime
+from sand_sim.engine.skin import begin_lifetime, build_allow, build_note_travel, build_remember, end_lifetime, set_pace
 from sand_sim.engine.smooth_tools import arguments_of, record_carrying, record_keeping, record_touching
 from sand_sim.engine.sorting import record_sort
 
@@ -101,6 +101,7 @@ def sort_stage(arrays: DemArrays, recorder) -> None:
     grains, cells, precision = arrays.grains, arrays.cells, arrays.recipe.precision
     active = grains.active
     recorder.share(build_find_corners(precision), [active.spans, grains.place, cells.corners])
+    recorder.share(build_join_corners(precision), [cells.corners])
     recorder.once(build_lay_cells(precision), [cells.corners, cells.levels, cells.low, cells.bins.spans, cells.bins.capacity])
     recorder.each(build_cell_keys(precision), active, [grains.place, cells.levels, cells.low, cells.bins.spans, arrays.keys])
     record_sort(recorder, arrays.keys, cells.bins, active, arrays.in_cells, order_last=False)
@@ -148,7 +149,8 @@ def list_stage(arrays: DemArrays, recorder) -> None:
 
     moved, paced = [grains.place, grains.origin, grains.came_from], [skin.lifetime, skin.pace]
     timed = [skin.radius, skin.widest, flags.steps_done, skin.renewed_at]
-    recorder.once(build_set_pace(precision), [active.spans, *moved, *timed, *paced])
+    recorder.share(build_note_travel(precision), [active.spans, *moved, skin.widest, skin.travel])
+    recorder.once(set_pace, [active.spans, skin.travel, *timed, *paced])
     recorder.each(build_allow(precision), active, [*moved, skin.widest, skin.pace, arrays.allowed])
     record_count(recorder, arrays.pair_list, active, partial(pairs, False), flags)
     if arrays.walls:
@@ -271,23 +273,9 @@ def finish_stage(arrays: DemArrays, recorder) -> None:
 def place_tools(arrays: DemArrays, recorder) -> None:
     """Put the tools where their tracks have them at the present step."""
     tools, lattice, setting = arrays.tools, arrays.lattice, arrays.setting
-    recorder.once(
-        finish.build_place_tools(arrays.recipe.precision),
-        [
-            tools.tracks,
-            tools.twist,
-            tools.shapes,
-            tools.states,
-            wp.vec3d(*lattice.centre),
-            1.0 / lattice.quantum,
-            float(lattice.end),
-            setting.dt,
-            arrays.flags.steps_done,
-            tools.travelled,
-            arrays.skin.widest,
-            arrays.flags.tools_moved,
-        ],
-    )
+    inputs = [tools.tracks, tools.twist, tools.shapes, tools.states, wp.vec3d(*lattice.centre), 1.0 / lattice.quantum]
+    inputs += [float(lattice.end), setting.dt, arrays.flags.steps_done, tools.travelled, arrays.skin.widest]
+    recorder.once(finish.build_place_tools(arrays.recipe.precision), [*inputs, arrays.flags.tools_moved])
 
 
 def _play(arrays: DemArrays, stages: tuple[Stage, ...], recorder) -> None:

@@ -9,7 +9,7 @@ from scenes import write_small_scene
 
 from sand_sim import World, load_scene
 from sand_sim.engine import sorting
-from sand_sim.engine.count import Count, part_start
+from sand_sim.engine.count import GROUP, Count, part_start
 from sand_sim.engine.cuda import CudaRecorder
 from sand_sim.engine.device import open_device
 from sand_sim.engine.kernel import kernel
@@ -88,6 +88,18 @@ def test_sort_is_stable_whatever_the_order_of_threads(keys, reverse):
         recorder.each(sorting.order_places, bins, [0, result.starts, result.order])
     np.testing.assert_array_equal(result.starts.numpy(), np.searchsorted(np.sort(key[:number]), np.arange(keys + 1)))
     np.testing.assert_array_equal(result.order.numpy()[:number], np.argsort(key[:number], kind="stable"))
+
+
+@pytest.mark.parametrize("shares", [1, GROUP - 1, GROUP, GROUP + 1, 5 * GROUP + 3])
+@pytest.mark.parametrize("number", [0, 40, 5000])
+def test_running_totals_over_any_number_of_shares(shares, number):
+    """Also where most shares are empty, and where groups of them are not full."""
+    device, counts = ManyThreads(shares=shares), np.random.default_rng(shares).integers(0, 9, 6000).astype(np.int32)
+    items, starts = Count(len(counts), 1, "cpu"), wp.zeros(len(counts) + 1, dtype=int, device="cpu")
+    items.set(number)
+    given = wp.array(counts, dtype=int, device="cpu")
+    sorting.record_running_totals(CudaRecorder(device), given, items, sorting.totals_of(device), starts)
+    np.testing.assert_array_equal(starts.numpy()[: number + 1], np.append(0, np.cumsum(counts[:number])))
 
 
 @kernel
