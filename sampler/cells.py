@@ -55,7 +55,10 @@ def row_of(cells: Cells, y: int, z: int) -> int:
 
 @wp.kernel(enable_backward=False, module="sampler_cells")
 def list_near(cells: Cells, reach: float, cursor: wp.array(dtype=int), near: wp.array(dtype=int)):
-    """Put each particle down in the lists of all cells within reach; where there are no lists yet count only."""
+    """Put each particle down in the lists of all cells within reach; where there are no lists yet count only.
+
+    Lists are in the order of the ranks on a CPU, in any order on a GPU.
+    """
     rank = wp.tid()
     here = cells.points[rank]
     low = cell_at(cells, here - wp.vec3(reach))

@@ -51,10 +51,11 @@ _NEAREST = f"""
             const float* way = kind ? along : straight;
             float nearest = best[3 * kind], next = best[3 * kind + 1], which = best[3 * kind + 2];
             for (int i = 0; i < count; ++i) {{
-                if (way[i] < nearest) {{
+                if (way[i] <= nearest) {{
+                    const int k = listed ? chosen[start + i] : start + i;
                     next = nearest < next ? nearest : next;
+                    if (way[i] < nearest || k < which) which = k;  // of equals the first, as lists of a GPU are in any order
                     nearest = way[i];
-                    which = listed ? chosen[start + i] : start + i;
                 }} else if (way[i] < next) next = way[i];
             }}
             best[3 * kind] = nearest; best[3 * kind + 1] = next; best[3 * kind + 2] = which;

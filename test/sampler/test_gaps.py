@@ -1,5 +1,7 @@
 """Gaps between particles, and what a particle is needed for, against NumPy; also after some of them have moved."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import trimesh
@@ -113,3 +115,20 @@ def test_particles_are_found_however_far_they_are_scattered():
         assert np.array_equal(found["which"], far.argmin(axis=1))
     apart = np.linalg.norm(points[:, None] - points, axis=2) + 2.0 * np.eye(50)
     assert gaps.neighbour_distances(1000.0) * 0.002 == pytest.approx(apart.min(axis=1), abs=1e-5)
+
+
+def test_of_equal_particles_the_first_is_nearest_whatever_the_order_of_lists():
+    """A GPU writes the lists of cells in any order; in a square lattice four particles are equally near to each middle."""
+    gaps = plane_gaps(100)
+    lattice, middles = (np.stack(np.meshgrid(x, x, [0.0]), -1).reshape(-1, 3) for x in (np.arange(9) / 8, np.arange(0.5, 8) / 8))
+    up = np.tile([0.0, 0.0, 1.0], (len(lattice), 1))
+    gaps.look(lattice, up)
+    places = gaps.skin.shifted(middles), up[: len(middles)].astype(np.float32)
+    wanted = gaps.measure(*places)
+    lists, begin = gaps.cells.near.numpy(), gaps.cells.near_begin.numpy()
+    for seed in range(3):
+        random = np.random.default_rng(seed)
+        for first, last in pairwise(begin):
+            random.shuffle(lists[first:last])
+        for found, one in zip(gaps.measure(*places), wanted, strict=True):
+            np.testing.assert_array_equal(found, one)
