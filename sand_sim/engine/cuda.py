@@ -88,6 +88,10 @@ class CudaDevice:
 
     def __init__(self, name: str = "cuda"):
         present = [device.alias for device in wp.get_cuda_devices()]
+        driver, toolkit = wp.get_cuda_driver_version(), wp.get_cuda_toolkit_version()
+        if driver and toolkit and driver < (toolkit[0], 0):  # Warp shows no GPU then
+            least = f"an NVIDIA driver for CUDA {toolkit[0]} or newer, and this one is for {driver[0]}.{driver[1]}"
+            raise ValueError(f"'{name}' needs {least}; use cpu, or update the driver")
         if not present:
             raise ValueError(f"'{name}' needs an NVIDIA GPU and its driver, and none is found here; use auto or cpu")
         if name not in ("cuda", *present):

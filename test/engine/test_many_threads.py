@@ -114,6 +114,14 @@ def test_parts_of_as_many_items_as_a_large_gpu_holds(number):
     np.testing.assert_array_equal(starts.numpy(), number * np.arange(4097) // 4096)
 
 
+def test_a_driver_that_is_too_old_is_told(monkeypatch):
+    """Warp finds no GPU then, which is there all the same."""
+    monkeypatch.setattr(wp, "get_cuda_driver_version", lambda: (12, 8))
+    monkeypatch.setattr(wp, "get_cuda_toolkit_version", lambda: (13, 4))
+    with pytest.raises(ValueError, match=r"'cuda' needs an NVIDIA driver for CUDA 13 or newer, and this one is for 12\.8"):
+        open_device("cuda", None)
+
+
 def test_device_is_refused_by_name(tmp_path):
     if wp.is_cuda_available():
         pytest.skip("this machine has a GPU")
