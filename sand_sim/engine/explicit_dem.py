@@ -45,6 +45,10 @@ class Sums:
 class ExplicitDem:
     """Grains, walls and tools under explicit time integration.
 
+    Attributes:
+        steps_done: steps since time zero; known on the host, because other threads ask for it, who must not ask a GPU: Warp
+            changes the stream of all threads while it reads an array.
+
     Args:
         arrays: state and scratch.
         device: the arrays', from ``device.open_device``.
@@ -55,14 +59,10 @@ class ExplicitDem:
         self.arrays, self.device = arrays, device
         self.stages = choose_stages(arrays)
         self._programs = {}
+        self.steps_done = 0
         device.load(list_kernels(arrays, self.stages, device), progress)
         arrays.flags.starting.fill_(1)
         self.expect_moves()
-
-    @property
-    def steps_done(self) -> int:
-        """Steps since time zero."""
-        return int(self.arrays.flags.steps_done.numpy()[0])
 
     def expect_moves(self) -> None:
         """Renew all contact lists before the next step: something has been moved from outside."""
@@ -85,6 +85,7 @@ class ExplicitDem:
         arrays = self.arrays
         self.renew_lists()
         arrays.flags.steps_done.zero_()
+        self.steps_done = 0
         arrays.deepest.zero_()
         arrays.carried_off.zero_()
         if arrays.tools:
@@ -149,6 +150,7 @@ class ExplicitDem:
         """Put a state of the same scene back."""
         if put_state(self.arrays, state):
             self._programs.clear()
+        self.steps_done = int(state["flags.steps_done"][0])
 
     def _play(self, stepping: bool) -> None:
         """Renew the lists and, if ``stepping``, step; stops early where a list had no room, with room when played again."""
@@ -156,7 +158,10 @@ class ExplicitDem:
         flags.running.fill_(1)
         flags.proceed.fill_(1)
         flags.stepping.fill_(int(stepping))
-        self._program(record_run)()
+        try:
+            self._program(record_run)()
+        finally:  # also where it has been broken off
+            self.steps_done = int(flags.steps_done.numpy()[0])
         fault = int(flags.fault.numpy()[0])
         flags.fault.zero_()
         if fault & (FAULT_NOT_FINITE | FAULT_TOO_FAST):

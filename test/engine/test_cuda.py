@@ -116,6 +116,20 @@ def test_a_frame_is_one_graph(device, make_world, monkeypatch):
     assert not np.array_equal(origin, world.assembly.solver.arrays.grains.origin.numpy())
 
 
+def test_other_threads_learn_the_time_without_asking_the_device(device, make_world, monkeypatch):
+    world = bed(make_world, device)
+    start = world.save()
+    world.step(30)
+    later = world.save()
+    with monkeypatch.context() as patch:
+        patch.setattr(wp.array, "numpy", lambda array: pytest.fail("an array is read"))
+        assert world.steps == 30
+        assert world.time == 30 * world.time_step
+    for state, steps in ((start, 0), (later, 30)):
+        world.restore(state)
+        assert world.steps == steps == int(world.assembly.solver.arrays.flags.steps_done.numpy()[0])
+
+
 @pytest.mark.parametrize("contact", ["rough", "smooth"])
 def test_tool_feels_what_it_feels_on_the_cpu(device, tmp_path, contact):
     wrenches = []
