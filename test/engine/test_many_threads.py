@@ -1,10 +1,12 @@
 """What the CUDA device does, on a CPU: every scene gives the same bits with one thread an item as with one lane a core."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import warp as wp
 from kinds import KINDS, flying_grains
-from many_threads import ManyThreads
+from many_threads import ManyThreads, ShuffledThreads
 from scenes import write_small_scene
 
 from sand_sim import World, load_scene
@@ -67,6 +69,30 @@ def test_same_bits(with_device, make_world, case):
     assert repr(seen[0].health) == repr(seen[1].health)
     np.testing.assert_array_equal(seen[0].grains.velocity, seen[1].grains.velocity)
     assert case != "grains that leave" or seen[0].health.retired > 20
+
+
+def in_and_out_of_order(with_device, make):
+    """A world on a device that takes threads in order, and one on a device that does not, after some steps and lists."""
+    worlds = [with_device(device, make) for device in (ManyThreads(vectors=False), ShuffledThreads())]
+    for world in worlds:
+        for _ in range(3):
+            world.step(20)
+            world.assembly.solver.expect_moves()
+        world.observe()
+    return worlds
+
+
+@pytest.mark.parametrize("case", KINDS)
+def test_same_bits_whatever_the_order_of_threads(with_device, make_world, case):
+    """Threads of a launch neither read what others of it write nor add up in the order in which they come."""
+    same_state(*in_and_out_of_order(with_device, lambda: flying_grains(make_world, case)))
+
+
+@pytest.mark.parametrize("contact", ["rough", "smooth"])
+def test_same_bits_at_a_tool_whatever_the_order_of_threads(with_device, tmp_path, contact):
+    scene = load_scene(write_small_scene(tmp_path))
+    scene = replace(scene, tools=tuple(replace(tool, contact=contact) for tool in scene.tools))
+    same_state(*in_and_out_of_order(with_device, lambda: World(scene)))
 
 
 @pytest.mark.parametrize("keys", [1, 3, 500])
