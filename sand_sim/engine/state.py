@@ -9,10 +9,10 @@ from sand_sim.engine.count import Count
 
 def take_state(arrays: DemArrays) -> dict[str, np.ndarray]:
     """Copy everything that the next step depends on, and what has been summed up so far, to the host."""
-    state = {name: array.numpy().copy() for name, array in _whole_arrays(arrays).items()}
+    state = {name: _on_host(array) for name, array in _whole_arrays(arrays).items()}
     state |= {f"{name}.number": np.array(count.get()) for name, count in _counts(arrays).items()}
     for name, (array, count) in _filled_arrays(arrays).items():
-        state[name] = array.numpy()[: count.get()].copy()
+        state[name] = _on_host(array[: count.get()])
     state["deepest"] = arrays.deepest.numpy().max(keepdims=True)
     state["carried_off"] = arrays.carried_off.numpy().sum(keepdims=True)
     return state
@@ -48,6 +48,12 @@ def put_state(arrays: DemArrays, state: dict[str, np.ndarray]) -> bool:
         lanes.zero_()
         wp.copy(lanes, wp.array(state[name], dtype=lanes.dtype, device=arrays.device), count=1)
     return grown
+
+
+def _on_host(array: wp.array) -> np.ndarray:
+    """A copy on the host; from a GPU ``numpy`` brings one."""
+    values = array.numpy()
+    return values.copy() if array.device.is_cpu else values
 
 
 def _counts(arrays: DemArrays) -> dict[str, Count]:
