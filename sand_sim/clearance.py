@@ -41,7 +41,7 @@ def find_obstacles(
     except TooManyPairsError as error:
         raise CommandError("crowded", str(error)) from None
     for wall, offset in zip(assembly.walls, _offsets(assembly), strict=True):
-        near = wall.distance(position - offset * wall.direction) < radius - spare
+        near = wall.gap(position - offset * wall.direction) < radius - spare
         blocked[wall.label] = np.flatnonzero(near)
     solids = [(m, m.tool.pose, pose) for m, pose in zip(assembly.tools, poses, strict=True)]
     solids += [(g, g.pose, (g.place, g.pose.orientation)) for g in assembly.grounds]

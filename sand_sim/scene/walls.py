@@ -48,10 +48,10 @@ class Wall:
         """What messages call it."""
         return f"wall '{self.name}'"
 
-    def distance(self, position: np.ndarray) -> np.ndarray:
-        """Distance of points, shape (n, 3) [m], from the surface, shape (n,) [m]; positive where a fill may put grains.
+    def gap(self, position: np.ndarray) -> np.ndarray:
+        """Distance of points, shape (n, 3) [m], from the surface, shape (n,) [m].
 
-        Those are both sides of plates and discs, but only the inner side of cylinders and cones.
+        It is negative behind planes and outside of cylinders without end, which push to one side only. Shells push to both.
         """
         away = position - self.point
         along = away @ self.direction
@@ -64,12 +64,19 @@ class Wall:
         line = self.end - self.begin
         here = np.column_stack([from_axis, along]) - self.begin
         share = np.clip(here @ line / (line @ line), 0.0, 1.0)
-        distance = np.linalg.norm(here - share[:, None] * line, axis=1)
-        if line[1] != 0.0:
-            level = here[:, 1] / line[1]
-            outside = (level > 0.0) & (level < 1.0) & (here[:, 0] > level * line[0])
-            distance = np.where(outside, -distance, distance)
-        return distance - thickness
+        return np.linalg.norm(here - share[:, None] * line, axis=1) - thickness
+
+    def distance(self, position: np.ndarray) -> np.ndarray:
+        """The same, and positive only where a fill may put grains: both sides of plates and discs, one of cylinders and cones."""
+        gap = self.gap(position)
+        if self.kind != "shell" or self.end[1] == self.begin[1]:
+            return gap
+        away = position - self.point
+        along = away @ self.direction
+        level = (along - self.begin[1]) / (self.end[1] - self.begin[1])
+        radius = self.begin[0] + level * (self.end[0] - self.begin[0])
+        outside = np.linalg.norm(away - along[:, None] * self.direction, axis=1) > radius
+        return np.where((level > 0.0) & (level < 1.0) & outside, -np.abs(gap), gap)
 
     @property
     def corners(self) -> np.ndarray:

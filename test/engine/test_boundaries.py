@@ -6,7 +6,7 @@ from kernel_source import source
 from scenes import record
 from walls import DOMAIN, GRAVITY, LINEAR, STIFFNESS, apart_from_each_other, overlaps, turned, wall
 
-from sand_sim import World, read_scene
+from sand_sim import CommandError, World, read_scene
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.surface_contacts import build_surface_forces, build_surface_search
 
@@ -279,3 +279,19 @@ def test_kernels_know_only_the_walls_there_are(make_world):
         assert "nearest_on_shell" in much
         assert "sphere_at" in much
         assert len(little) < 0.75 * len(much)
+
+
+def test_new_grains_may_lie_outside_of_shells_as_well(make_world):
+    """Cylinders and cones push to both sides: here a grain slides down a roof, from which it was said to overlap it."""
+    slope, radius, reach = 0.6, 0.005, 0.05
+    roof = wall("cone", [0, 0, -1], [0, 0, 0], name="roof", hole_radius=0.0, radius=0.2, height=0.2 * np.tan(slope))
+    up, down = np.array([np.sin(slope), 0.0, np.cos(slope)]), np.array([np.cos(slope), 0.0, -np.sin(slope)])
+    world = make_world([0.0, 0.0, 0.2], radius, boundaries=[roof], domain=DOMAIN, friction=0.0, gravity=[0.0, 0.0, -GRAVITY])
+    for side in (up, -up):
+        with pytest.raises(CommandError, match="1 overlap wall 'roof'"):
+            world.add_grains(reach * down + 0.99 * radius * side, radius)
+    world.add_grains([reach * down + side * radius for side in (up, -up)], radius)
+    world.step(round(0.1 / world.time_step))
+    outer, inner = world.observe().grains.velocity[1:]
+    assert outer == pytest.approx(GRAVITY * np.sin(slope) * world.time * down, abs=2e-3)
+    assert inner == pytest.approx([0.0, 0.0, -GRAVITY * world.time], abs=1e-6)
