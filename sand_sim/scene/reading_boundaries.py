@@ -9,6 +9,7 @@ from sand_sim.scene.types import ROUGH, SMOOTH, Boundary, Drive, Rough, Terrain,
 
 _SIDES = ("left", "right", "front", "back", "bottom", "top")
 _LATTICES = ("triangular", "square")
+_INSIDE, _OUTSIDE = "inside", "outside"
 _COMMON = ("type", "material", "name")
 _NEEDED = {
     "plane": ("point", "normal"),
@@ -22,8 +23,8 @@ _NEEDED = {
 _OPTIONAL = {
     "plane": ("rough",),
     "box": ("open", "rough"),
-    "cylinder": ("height", "rough"),
-    "cone": ("height", "angle", "rough"),
+    "cylinder": ("height", "rough", "grains"),
+    "cone": ("height", "angle", "rough", "grains"),
     "hole_plate": ("rough",),
     "plunger": ("radius", "velocity", "force", "mass", "max_speed", "travel", "rough"),
     "terrain": ("mesh", "heights", "spacing", "contact", "scale", "pose"),
@@ -70,6 +71,10 @@ def read_boundary(entry: Field, folder: Path) -> Boundary:
             raise entry["hole_radius"].refuse(f"must be less than 'radius', {common['radius']:g} m")
     if kind == "cone":
         common["height"] = _cone_height(entry, common["radius"] - common["hole_radius"])
+    if "grains" in entry:
+        common["around"] = entry["grains"].choice((_INSIDE, _OUTSIDE)) == _OUTSIDE
+        if common["around"] and not common["height"]:
+            raise entry["grains"].refuse("'outside' needs a 'height' [m]; a cylinder without end has grains inside only")
     return Boundary(**common)
 
 

@@ -133,6 +133,7 @@ class Boundary:
     radius: float = 0.0  # [m] of the cylinder, of the wide end, of the plate; zero for a plunger without edge
     hole_radius: float = 0.0  # [m]
     height: float = 0.0  # [m] along the axis; zero for a cylinder without end
+    around: bool = False  # whether fills go around a cylinder or cone, as of a pillar or a roof, not into it
     low: Vector | None = None  # [m]
     high: Vector | None = None  # [m]
     open_sides: tuple[str, ...] = ()

@@ -30,6 +30,7 @@ class Wall:
         begin, end: of the shell's line, distance from the axis and height above ``point``, shape (2,) [m].
         rough: its virtual spheres.
         drive: how it moves along ``direction``.
+        around: whether fills put grains around a shell, not into it.
     """
 
     kind: str
@@ -42,6 +43,7 @@ class Wall:
     end: np.ndarray | None = None
     rough: Rough | None = None
     drive: Drive | None = None
+    around: bool = False
 
     @property
     def label(self) -> str:
@@ -76,7 +78,7 @@ class Wall:
         level = (along - self.begin[1]) / (self.end[1] - self.begin[1])
         radius = self.begin[0] + level * (self.end[0] - self.begin[0])
         outside = np.linalg.norm(away - along[:, None] * self.direction, axis=1) > radius
-        return np.where((level > 0.0) & (level < 1.0) & outside, -np.abs(gap), gap)
+        return np.where((level > 0.0) & (level < 1.0) & (outside != self.around), -np.abs(gap), gap)
 
     @property
     def corners(self) -> np.ndarray:
@@ -102,7 +104,7 @@ def walls_of(boundary: Boundary) -> list[Wall]:
         shape |= {"begin": np.array([inner, 0.0]), "end": np.array([boundary.radius, boundary.height])}
     place = {"point": np.asarray(boundary.point, float), "direction": unit(boundary.direction)}
     common = {"name": boundary.name, "material": boundary.material, "rough": boundary.rough, "drive": boundary.drive}
-    return [Wall(**shape, **place, **common)]
+    return [Wall(**shape, **place, **common, around=boundary.around)]
 
 
 def _sides(boundary: Boundary) -> list[Wall]:

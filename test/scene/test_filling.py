@@ -111,9 +111,11 @@ def test_what_takes_the_room_of_the_grains_is_named(tmp_path):
         World(read_scene(scene, tmp_path))
 
 
-def settled(tmp_path, fills, boundaries):
+def settled(tmp_path, fills, boundaries, friction=0.5):
     maker = SceneMaker(tmp_path)
-    scene = maker.scene([[0.0, 0.0, 0.0]], 0.005, gravity=[0.0, 0.0, -9.81], precision="single", restitution=0.3)
+    scene = maker.scene(
+        [[0.0, 0.0, 0.0]], 0.005, gravity=[0.0, 0.0, -9.81], precision="single", restitution=0.3, friction=friction
+    )
     scene |= {"fills": fills, "boundaries": boundaries, "settle": {"time": 0.6, "speed": 0.02}}
     return World(read_scene(scene, tmp_path))
 
@@ -274,3 +276,27 @@ def test_columns_that_would_be_left_out_are_refused(tmp_path, content, named):
     (tmp_path / "grains.csv").write_text(content)
     with pytest.raises(SceneError, match=rf"grains\.csv.* {named}"):
         fill_grains(Fill("bed", "sand", file=tmp_path / "grains.csv"), SAND, 0, [])
+
+
+def test_a_bed_lies_in_the_ring_between_two_cylinders(tmp_path):
+    """As high as asked, in the ring only, and the floor below smooth walls bears its weight."""
+    inner, outer, height, size = 0.03, 0.075, 0.04, 0.005
+    upright = {"type": "cylinder", "material": "wall", "point": [0.0, 0.0, 0.0], "axis": [0.0, 0.0, 1.0]}
+    pillar = upright | {"name": "pillar", "radius": inner, "height": 0.3, "grains": "outside"}
+    region = {"low": [-outer, -outer, 0.0], "high": [outer, outer, 0.25]}
+    fills = [{"material": "grain", "radius": size, "region": region, "height": height}]
+    walls = [*floor(), pillar, upright | {"name": "pipe", "radius": outer}]
+    world = settled(tmp_path, fills, walls, friction=0.0)
+    shown = world.observe()
+    grains = shown.grains
+    away = np.linalg.norm(grains.position[:, :2], axis=1)
+    assert away.min() == pytest.approx(inner + size, rel=0.01)
+    assert away.max() == pytest.approx(outer - size, rel=0.01)
+    assert grains.position[:, 2].max() == pytest.approx(height - size, abs=size)
+    solid = len(grains) * 4.0 / 3.0 * size**3 / ((outer**2 - inner**2) * height)
+    assert solid == pytest.approx(0.55, abs=0.05)  # the walls leave gaps
+    felt = []
+    for _ in range(50):  # what was struck off a moment ago lets the bed swing
+        world.step(round(0.01 / world.time_step))
+        felt.append(-world.observe().wall("floor").force[2])
+    assert np.mean(felt[25:]) == pytest.approx(9.81 * grains.mass.sum(), rel=5e-3)

@@ -22,6 +22,8 @@ def test_what_is_read():
     assert read(CONE | {"angle": pi / 6}).height == pytest.approx(0.04 / tan(pi / 6))
     assert read(CONE | {"height": 0.02}).height == 0.02
     assert read(CYLINDER).height == 0.0
+    assert not read(CYLINDER | {"height": 0.1, "grains": "inside"}).around
+    assert read(CONE | {"height": 0.1, "grains": "outside"}).around
     assert read(CYLINDER | {"rough": {"radius": 0.002}}).rough.spacing == 0.004
     driven = read(PLUNGER | {"velocity": -0.1, "travel": 0.02}).drive
     assert (driven.velocity, driven.force, driven.travel) == (-0.1, None, 0.02)
@@ -50,6 +52,8 @@ def test_plungers_and_terrains_need_names_of_their_own():
         (CONE | {"height": 0.1, "hole": 0.01}, "boundaries[0]: unknown field 'hole'"),
         (CONE | {"height": 0.1, "velocity": 1}, "boundaries[0]: unknown field 'velocity'"),
         (CONE | {"height": 0.1, "axis": [0, 0, 0]}, "boundaries[0].axis: must not be the zero vector"),
+        (CYLINDER | {"grains": "outside"}, "boundaries[0].grains: 'outside' needs a 'height' [m]"),
+        (CYLINDER | {"height": 1, "grains": "out"}, "boundaries[0].grains: unknown 'out'; known are inside, outside"),
         (CYLINDER | {"height": -1}, "boundaries[0].height: must be greater than 0 [m]"),
         (CYLINDER | {"rough": {"spacing": 0.01}}, "boundaries[0].rough: the field 'radius' is missing"),
         (CYLINDER | {"rough": {"radius": 0.0}}, "boundaries[0].rough.radius: must be greater than 0 [m]"),
