@@ -10,6 +10,7 @@ from sand_sim.tool_model import Progress
 
 _CHUNKS = 50
 _FALL = 0.3  # of the speed at which the highest grain would end its fall
+_THROWN = 10.0  # times the speed of a bed at rest: what is given so much was meant to fly
 _SLOWED = 0.2  # share of the time in which drag slows grains down, after which it is applied anew
 
 
@@ -22,13 +23,14 @@ def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> l
         progress: called with the name of the stage and the share of it that is done, 0 to 1.
 
     Returns:
-        What the user should know: that grains have not come to rest, have left, or do not come up to the height of their fill.
+        What the user should know: that grains have lost velocities that they were given, have not come to rest, have left, or do
+        not come up to the height of their fill.
 
     Raises:
         SceneError: if the bed blows up, or all grains leave.
     """
     if assembly.scene.settle.time > 0.0:
-        told = _come_to_rest(assembly, doubts, progress)
+        told = _spent(assembly) + _come_to_rest(assembly, doubts, progress)
         left = assembly.table.grains - len(observe_grains(assembly))
         if left:
             told.append(
@@ -71,6 +73,21 @@ def _come_to_rest(assembly: Assembly, doubts: tuple[str, ...], progress: Progres
     return [
         f"settle: grains still move at {speed:.2g} m/s (root mean square) after {asked.time:g} s, speed {asked.speed:g} m/s was "
         "asked; give it more time or ask for less"
+    ]
+
+
+def _spent(assembly: Assembly) -> list[str]:
+    """Told where a ball that shall hit a bed has hit it, and lies there, before time zero."""
+    scene, table, speed = assembly.scene, assembly.table, np.zeros(assembly.table.grains)
+    np.maximum.at(speed, table.grain, np.linalg.norm(table.velocity, axis=1))
+    thrown, numbers = speed > _THROWN * scene.settle.speed, [*assembly.fill_numbers, *np.ones(len(scene.bodies), int)]
+    names = [f"fill '{fill.name}'" for fill in scene.fills] + [f"body '{body.name}'" for body in scene.bodies]
+    of_each = np.split(thrown, np.cumsum(numbers)[:-1])
+    return [
+        f"settle: {name} is given a velocity, which it has lost by time zero, as it flies while others settle; let the bed "
+        "settle in a scene of its own, and read it from a file where it shall be hit"
+        for name, own in zip(names, of_each, strict=True)
+        if own.any()
     ]
 
 
