@@ -3,8 +3,10 @@
 import numpy as np
 
 from sand_sim.assemble import Assembly, fall_height
+from sand_sim.clearance import find_obstacles
 from sand_sim.engine.explicit_dem import UnstableError
-from sand_sim.observing import observe_grains
+from sand_sim.engine.reviving import revive
+from sand_sim.observing import observe_grains, observe_spheres
 from sand_sim.scene.types import SceneError
 from sand_sim.tool_model import Progress
 
@@ -17,6 +19,8 @@ _SLOWED = 0.2  # share of the time in which drag slows grains down, after which 
 def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> list[str]:
     """Let the grains come to rest as the scene asks, and strike off what then lies above the height of its fill.
 
+    Bodies that are thrown are not there meanwhile: a ball that shall hit a bed would lie on it at time zero.
+
     Args:
         assembly: the world's.
         doubts: that were there before the first step.
@@ -27,10 +31,15 @@ def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> l
         not come up to the height of their fill.
 
     Raises:
-        SceneError: if the bed blows up, or all grains leave.
+        SceneError: if the bed blows up, all grains leave, or there is no room for a body that is thrown.
     """
     if assembly.scene.settle.time > 0.0:
-        told = _spent(assembly) + _come_to_rest(assembly, doubts, progress)
+        thrown, start = _thrown(assembly), assembly.solver.take_state()
+        assembly.solver.remove(thrown)
+        told = _spent(assembly)
+        if len(thrown) < len(assembly.table):
+            told += _come_to_rest(assembly, doubts, progress)
+        _throw(assembly, start, thrown)
         left = assembly.table.grains - len(observe_grains(assembly))
         if left:
             told.append(
@@ -76,19 +85,42 @@ def _come_to_rest(assembly: Assembly, doubts: tuple[str, ...], progress: Progres
     ]
 
 
+def _thrown(assembly: Assembly) -> np.ndarray:
+    """Identities of the spheres of bodies that are given a velocity or a spin, shape (n,)."""
+    first = sum(assembly.fill_numbers)
+    bodies = [k for k, body in enumerate(assembly.scene.bodies, first) if any(body.velocity) or any(body.spin)]
+    return np.flatnonzero(np.isin(assembly.grain_of_sphere, bodies))
+
+
+def _throw(assembly: Assembly, start: dict[str, np.ndarray], thrown: np.ndarray) -> None:
+    """Put bodies where they were, to fly from now on."""
+    if not len(thrown):
+        return
+    assembly.solver.measure()
+    table, poses = assembly.table, [(tool.pose.position, tool.pose.orientation) for tool in assembly.scene.tools]
+    there = find_obstacles(assembly, observe_spheres(assembly), poses, table.position[thrown], table.radius[thrown])
+    there.pop("one another", None)
+    for name, which in there.items():
+        body = assembly.scene.bodies[assembly.grain_of_sphere[thrown[which[0]]] - sum(assembly.fill_numbers)]
+        raise SceneError(
+            f"bodies.{body.name}: is given a velocity or a spin, so it comes in when beds have settled, and overlaps {name} "
+            "then; place it higher"
+        )
+    revive(assembly.solver, start, thrown)
+
+
 def _spent(assembly: Assembly) -> list[str]:
-    """Told where a ball that shall hit a bed has hit it, and lies there, before time zero."""
-    scene, table, speed = assembly.scene, assembly.table, np.zeros(assembly.table.grains)
-    np.maximum.at(speed, table.grain, np.linalg.norm(table.velocity, axis=1))
-    thrown, numbers = speed > _THROWN * scene.settle.speed, [*assembly.fill_numbers, *np.ones(len(scene.bodies), int)]
-    names = [f"fill '{fill.name}'" for fill in scene.fills] + [f"body '{body.name}'" for body in scene.bodies]
-    of_each = np.split(thrown, np.cumsum(numbers)[:-1])
-    return [
-        f"settle: {name} is given a velocity, which it has lost by time zero, as it flies while others settle; let the bed "
-        "settle in a scene of its own, and read it from a file where it shall be hit"
-        for name, own in zip(names, of_each, strict=True)
-        if own.any()
-    ]
+    """Told where grains that shall hit a bed have hit it, and lie there, before time zero."""
+    scene, speed = assembly.scene, np.linalg.norm(assembly.table.velocity, axis=1)
+    fast, first, told = assembly.grain_of_sphere[speed > _THROWN * scene.settle.speed], 0, []
+    for fill, number in zip(scene.fills, assembly.fill_numbers, strict=True):
+        if np.any((fast >= first) & (fast < first + number)):
+            told.append(
+                f"settle: fill '{fill.name}' is given a velocity, which it has lost by time zero, as it flies while others "
+                "settle; let the bed settle in a scene of its own, and read it from a file where it shall be hit, or throw a body"
+            )
+        first += number
+    return told
 
 
 def _drag(assembly: Assembly, gravity: float) -> float:
