@@ -22,6 +22,11 @@ class FrameTree:
         self.root = root
         self._frames: dict[str, Frame] = {}
 
+    @property
+    def names(self) -> set[str]:
+        """Of all frames below the root."""
+        return {*self._frames}
+
     def put(self, frame: Frame) -> None:
         """Add or replace a frame.
 

@@ -14,11 +14,12 @@ from rosgraph_msgs.msg import Clock
 
 from msg_adapters import simulation_interfaces, tf2_msgs
 from msg_adapters.builtin_interfaces import time_to_stamp
-from sand_sim.border import Frame, Observation
+from sand_sim.border import Observation
 from sand_sim.checkpoints import CheckpointFolder
 from sand_sim.config_folder import find_scene
 from sand_sim.courses import StampRules
 from sand_sim.engine.explicit_dem import UnstableError
+from sand_sim.frames import FrameTree
 from sand_sim.node.bed_outputs import BedOutputs, coarse_points
 from sand_sim.node.change_services import ChangeServices
 from sand_sim.node.connections import Connections
@@ -28,7 +29,7 @@ from sand_sim.node.parameters import Parameters, tool_declarations
 from sand_sim.node.robot import read_robot
 from sand_sim.node.services import Services
 from sand_sim.node.simulation_services import SimulationServices
-from sand_sim.node.tool_inputs import ToolInputs
+from sand_sim.node.tool_inputs import ToolInputs, check_sources, fixed_frames
 from sand_sim.node.tool_outputs import ToolOutputs
 from sand_sim.report import progress_line
 from sand_sim.scene.reading import load_scene
@@ -168,8 +169,13 @@ class SandSimNode(LifecycleNode):
             scene = replace(scene, solver=replace(scene.solver, threads=parameters["threads"]))
         for tool in scene.tools:
             parameters.declare(tool_declarations(tool.name, tool.link))
-        parameters.check_frames([tool.name for tool in scene.tools])
+        # What can be refused is refused before meshes are sampled and the bed settles, which may take minutes.
+        tools = [tool.name for tool in scene.tools]
+        parameters.check_frames(tools)
+        check_sources(parameters, tools)
         description, robot = read_robot(self, self._progress)
+        checkpoints = self._open_checkpoints(scene.name)
+        frames = fixed_frames(parameters, robot.fixed_frames() if robot else [])
         scene = replace(scene, robot_description=description, mesh_roots=tuple(parameters["mesh_roots"]))
         world = World(scene, self._progress)
         recording, output = (
@@ -187,13 +193,13 @@ class SandSimNode(LifecycleNode):
             on_fault=self._fail,
             on_reject=lambda error: self.get_logger().warning(f"rejected: {error}", throttle_duration_sec=1.0),
             rules=self._rules(),
-            checkpoints=self._open_checkpoints(scene.name),
+            checkpoints=checkpoints,
             pack_history=lambda: self.recorder.log.pack(),  # noqa: PLW0108 - the log is another one after a reset
             unpack_history=lambda packed: self.recorder.log.unpack(packed),  # noqa: PLW0108
         )
         self._last = self._diagnosed = None
         self._told = time.monotonic()
-        self._connect(world, robot.fixed_frames() if robot else [])
+        self._connect(world, frames)
         self._endings.callback(self.simulation.stop)  # before what it publishes to goes
         if parameters["resume"]:
             self.simulation.resume()
@@ -215,7 +221,7 @@ class SandSimNode(LifecycleNode):
         self._endings.callback(folder.close)
         return folder
 
-    def _connect(self, world: World, frames: list[Frame]) -> None:
+    def _connect(self, world: World, frames: FrameTree) -> None:
         connections = Connections(self, in_haste=lambda: self.simulation.pacing == "lockstep")
         parameters = self.parameters
         self._endings.callback(connections.close)

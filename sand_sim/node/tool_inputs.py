@@ -26,11 +26,8 @@ class ToolInputs:
         parameters: of the node, those of the tools declared.
         simulation: that gets the commands.
         active: tells whether commands are taken now.
-        frames: fixed ones of the robot, parents first; those that parameters fix, too, are as the parameters say.
+        frames: those that are fixed, from ``fixed_frames``; what TF tells comes to them.
         last: tells what was shown last, None if nothing was.
-
-    Raises:
-        ValueError: if a tool is to follow TF and its messages are not installed, or a fixed frame cannot be.
 
     Attributes:
         frames: in which poses may be given.
@@ -42,12 +39,11 @@ class ToolInputs:
         parameters: Parameters,
         simulation: Simulation,
         active: Callable[[], bool],
-        frames: Sequence[Frame] = (),
+        frames: FrameTree,
         last: Callable[[], Observation | None] = lambda: None,
     ):
         self._parameters, self._simulation, self._active, self._last = parameters, simulation, active, last
-        self.frames = _fixed_frames(parameters, frames)
-        self._fixed = {*parameters["frame_names"], *(frame.name for frame in frames)}
+        self.frames, self._fixed = frames, frames.names
         self._followers: dict[str, str] = {}
         self._followed: dict[str, float] = {}
         for tool in simulation.world.scene.tools:
@@ -59,8 +55,6 @@ class ToolInputs:
     def _connect(self, connections: Connections, tool: str) -> None:
         source = self._parameters[f"tools.{tool}.source"]
         if source == "tf":
-            if tf2_msgs.TFMessage is None:
-                raise ValueError(f"parameter tools.{tool}.source: 'tf' needs the package tf2_msgs, which is not installed")
             self._followers[tool] = self._parameters[f"tools.{tool}.frame"]
         elif source == "twist":
             self._listen(connections, TwistStamped, tool, "twist", self._velocity)
@@ -141,7 +135,27 @@ class ToolInputs:
         return max([time for time in times if time <= last.time + self._simulation.frame] or times)
 
 
-def _fixed_frames(parameters: Parameters, of_robot: Sequence[Frame]) -> FrameTree:
+def check_sources(parameters: Parameters, tools: Sequence[str]) -> None:
+    """See that all tools can be driven as the parameters ask.
+
+    Raises:
+        ValueError: if one is to follow TF and its messages are not installed.
+    """
+    for tool in tools:
+        if parameters[f"tools.{tool}.source"] == "tf" and tf2_msgs.TFMessage is None:
+            raise ValueError(f"parameter tools.{tool}.source: 'tf' needs the package tf2_msgs, which is not installed")
+
+
+def fixed_frames(parameters: Parameters, of_robot: Sequence[Frame] = ()) -> FrameTree:
+    """The frames that are where they are from the start.
+
+    Args:
+        parameters: of the node.
+        of_robot: those of the robot, parents first; what parameters fix, too, is as the parameters say.
+
+    Raises:
+        ValueError: if one cannot be.
+    """
     tree = FrameTree(parameters["frame_id"])
     names = [name for name in parameters["frame_names"] if name]
     for frame in of_robot:

@@ -2,7 +2,13 @@
 
 import pytest
 
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+from rclpy.parameter import Parameter
+from scenes import write_small_scene
+
 from sand_sim.node import preparing
+from sand_sim.node.node import SandSimNode
 from sand_sim.node.preparing import Preparation
 
 
@@ -22,3 +28,28 @@ def test_the_start_ends_where_the_user_wants_to_stop():
 
     with pytest.raises(KeyboardInterrupt):
         Preparation(check, print)("compiling", 0.5)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "told"),
+    [
+        ({"tools.plate.source": "tf"}, "parameter tools.plate.source: 'tf' needs the package tf2_msgs, which is not installed"),
+        (
+            {"frame_names": ["base"], "frames.base.parent": "odom"},
+            r"parameter frames.base.parent: .* nothing tells where 'odom' is",
+        ),
+        ({"checkpoints": True, "states": "/dev/null/states"}, "checkpoint folder /dev/null/states: "),
+    ],
+)
+def test_what_cannot_be_is_refused_before_the_work_begins(ros, tmp_path, monkeypatch, parameters, told):
+    monkeypatch.setattr("msg_adapters.tf2_msgs.TFMessage", None)
+    stages = []
+    given = parameters | {"scene": str(write_small_scene(tmp_path))}
+    overrides = [Parameter(name, value=value) for name, value in given.items()]
+    node = SandSimNode(lambda stage, share: stages.append(stage), parameter_overrides=overrides)
+    try:
+        with pytest.raises(ValueError, match=told):
+            node.start()
+    finally:
+        node.destroy_node()
+    assert not stages

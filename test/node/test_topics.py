@@ -28,7 +28,7 @@ from sand_sim import rotation
 from sand_sim.border import Frame, ToolVelocity
 from sand_sim.low_pass import LowPass
 from sand_sim.node import bed_outputs
-from sand_sim.node.tool_inputs import ToolInputs
+from sand_sim.node.tool_inputs import ToolInputs, fixed_frames
 
 TOOL = "/sand_sim/tools/plate"
 PRESSED = [0.015, 0.015, 0.0238]
@@ -279,7 +279,8 @@ def follow(monkeypatch):
         heard[topic](SimpleNamespace(transforms=[frame_to_transform(frame) for frame in frames]))
 
     def start(last=lambda: None, frames=()):
-        ToolInputs(SimpleNamespace(subscription=subscribe), parameters, simulation, lambda: True, frames, last)
+        known = fixed_frames(parameters, frames)
+        ToolInputs(SimpleNamespace(subscription=subscribe), parameters, simulation, lambda: True, known, last)
         return tell, submitted, rejected
 
     return start
