@@ -19,7 +19,9 @@ def config_folder() -> Path:
 
 
 def find_scene(name: str) -> Path:
-    """A scene file by its path, or one of the package's own by its name with or without ``.yaml`` or ``config/``.
+    """A scene file by its path, or one of the package's own by its bare name.
+
+    A name with an ending or a folder is that of a file: where the user's own ``dig.yaml`` is not there, nobody wants ours.
 
     Raises:
         SceneError: if there is no such file.
@@ -27,10 +29,9 @@ def find_scene(name: str) -> Path:
     path = Path(name).expanduser()
     if path.is_file():
         return path
-    own = config_folder() / path.name
-    if path.parent in (Path(), Path("config")):  # else it is a file of the user's that is not there
-        for candidate in (own, own.with_suffix(".yaml")):
-            if candidate.is_file():
-                return candidate
-    known = ", ".join(sorted(p.stem for p in config_folder().glob("*.yaml")))
-    raise SceneError(f"scene '{name}': there is no such file; the package's own scenes are {known}")
+    known = {own.stem: own for own in sorted(config_folder().glob("*.yaml"))}
+    if name in known:
+        return known[name]
+    where, like = "" if path.is_absolute() else f" in {Path.cwd()}", Path(f"{name}.yaml").expanduser()
+    hint = f"is '{like}' meant?" if like.is_file() else f"the package's own scenes are {', '.join(known)}"
+    raise SceneError(f"scene '{name}': there is no such file{where}; {hint}")

@@ -143,14 +143,24 @@ def test_unreadable_files_are_refused_in_one_line(tmp_path, content, named):
     assert "\n" not in str(caught.value)
 
 
-def test_missing_file_is_refused(tmp_path):
+def test_missing_file_is_refused(tmp_path, monkeypatch):
     with pytest.raises(SceneError, match="No such file"):
         load_scene(tmp_path / "nothing.yaml")
     with pytest.raises(SceneError, match="the package's own scenes are"):
         find_scene("nothing")
     with pytest.raises(SceneError, match=r"'typo/dig\.yaml': there is no such file"):
         find_scene("typo/dig.yaml")
-    assert find_scene("dig") == find_scene("dig.yaml") == find_scene("config/dig.yaml").resolve()
+    monkeypatch.chdir(tmp_path)  # where no file of the user's own bears a name of ours
+    for name in ("dig.yaml", "config/dig.yaml", "./dig"):
+        with pytest.raises(
+            SceneError, match=f"scene '{name}': there is no such file in {tmp_path}; the package's own scenes are"
+        ):
+            find_scene(name)
+    (tmp_path / "mine.v2.yaml").write_text("")
+    with pytest.raises(SceneError, match=r"there is no such file in .*; is 'mine\.v2\.yaml' meant\?"):
+        find_scene("mine.v2")
+    assert find_scene("mine.v2.yaml").resolve() == tmp_path / "mine.v2.yaml"
+    assert find_scene("dig").name == "dig.yaml"
 
 
 def test_a_scene_without_a_name_has_that_of_its_file(tmp_path):
