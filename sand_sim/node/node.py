@@ -4,7 +4,6 @@ import time
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
-from itertools import chain, count
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +26,7 @@ from sand_sim.node.diagnosis import Diagnosis
 from sand_sim.node.graph_watch import GraphWatch
 from sand_sim.node.parameters import Parameters, tool_declarations
 from sand_sim.node.robot import read_robot
+from sand_sim.node.run_files import RunFiles
 from sand_sim.node.services import Services
 from sand_sim.node.simulation_services import SimulationServices
 from sand_sim.node.tool_inputs import ToolInputs, check_sources, fixed_frames
@@ -63,7 +63,7 @@ class SandSimNode(LifecycleNode):
         super().__init__("sand_sim", **node_arguments)
         self.configured = self.done = self.incomplete = self._active = self._held = self._starting = False
         self.failure: Exception | None = None
-        self._progress, self._endings = progress, ExitStack()
+        self._progress, self._endings, self._files = progress, ExitStack(), RunFiles(self.get_logger().info)
         try:
             self.parameters = Parameters(self)
         except BaseException:
@@ -178,11 +178,7 @@ class SandSimNode(LifecycleNode):
         frames = fixed_frames(parameters, robot.fixed_frames() if robot else [])
         scene = replace(scene, robot_description=description, mesh_roots=tuple(parameters["mesh_roots"]))
         world = World(scene, self._progress)
-        recording, output = (
-            Path(parameters[name]).expanduser() if parameters[name] else None for name in ("recording", "output")
-        )
-        if recording and parameters["resume"]:
-            recording = _unused(recording)
+        recording, output = self._files.places(parameters, scene.name)
         self.recorder = Recorder(world, recording, output, parameters["view"], parameters["particles"], self.get_logger().warning)
         self._endings.callback(self._finish_files)
         self.simulation = Simulation(
@@ -253,6 +249,7 @@ class SandSimNode(LifecycleNode):
 
     def _finish_files(self) -> None:
         for path in self.recorder.close():
+            self._files.add(path)
             self.get_logger().info(f"written {path}")
         self.incomplete = self.incomplete or bool(self.recorder.failed)
 
@@ -320,9 +317,3 @@ class SandSimNode(LifecycleNode):
             if self._frames and self._frames.get_subscription_count() != self._frame_readers:
                 self._publish_frames(observation)
             self._bed.tell(observation)
-
-
-def _unused(path: Path) -> Path:
-    """The path, with a number where there is such a file: a run that goes on must not replace what has been recorded before."""
-    numbered = (path.with_stem(f"{path.stem}.{number}") for number in count(2))
-    return next(one for one in chain([path], numbered) if not one.exists())

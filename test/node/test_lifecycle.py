@@ -72,6 +72,20 @@ def test_a_life(client, start_node, tmp_path):
     assert node.done
 
 
+def test_each_run_of_a_node_has_files_of_its_own(client, start_node, tmp_path):
+    recording, output = tmp_path / "a.rrd", tmp_path / "out"
+    node = start_node(autostart=False, pacing="lockstep", recording=str(recording), output=str(output))
+    for _ in range(3):
+        for transition in ("configure", "activate"):
+            assert change(client, transition)
+        assert client.call(Trigger, "step").success
+        for transition in ("deactivate", "cleanup"):
+            assert change(client, transition)
+    assert all((tmp_path / file).stat().st_size for file in ("a.rrd", "a.2.rrd", "a.3.rrd"))
+    assert all((output / folder / "small.json").stat().st_size for folder in (".", "2", "3"))
+    assert not node.incomplete
+
+
 def test_impossible_transitions_are_refused(client, start_node):
     node = start_node(pacing="lockstep")
     for label in ("configure", "activate", "cleanup", "unconfigured_shutdown"):
