@@ -4,6 +4,7 @@ import os
 import re
 import sys
 from importlib.util import find_spec
+from os.path import expanduser  # unlike that of Path it leaves a home that nobody knows as it is
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
@@ -34,7 +35,7 @@ def locate_mesh(address: str, folder: Path | None = None, kind: str = "mesh") ->
     elif parts.scheme == "file":
         path = Path(unquote(parts.path))
     elif parts.scheme == "" or len(parts.scheme) == 1:
-        path = Path(address).expanduser()
+        path = Path(expanduser(address))
         path = path if path.is_absolute() else (folder or Path.cwd()) / path
     else:
         raise MeshError(f"{kind} '{address}': unknown scheme '{parts.scheme}://'; use package://, file:// or a path")

@@ -1,5 +1,6 @@
 """Where the package's own scenes and parameters are, from a source tree or installed."""
 
+from os.path import expanduser  # unlike that of Path it leaves a home that nobody knows as it is
 from pathlib import Path
 
 from sampler import package_prefixes
@@ -26,12 +27,12 @@ def find_scene(name: str) -> Path:
     Raises:
         SceneError: if there is no such file.
     """
-    path = Path(name).expanduser()
+    path = Path(expanduser(name))
     if path.is_file():
         return path
     known = {own.stem: own for own in sorted(config_folder().glob("*.yaml"))}
     if name in known:
         return known[name]
-    where, like = "" if path.is_absolute() else f" in {Path.cwd()}", Path(f"{name}.yaml").expanduser()
+    where, like = "" if path.is_absolute() else f" in {Path.cwd()}", Path(expanduser(f"{name}.yaml"))
     hint = f"is '{like}' meant?" if like.is_file() else f"the package's own scenes are {', '.join(known)}"
     raise SceneError(f"scene '{name}': there is no such file{where}; {hint}")

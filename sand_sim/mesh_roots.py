@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from os.path import expanduser  # unlike that of Path it leaves a home that nobody knows as it is
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 
@@ -25,7 +26,7 @@ def mesh_roots(names: Iterable[str], *usual: Path) -> tuple[list[Path], bool]:
         SceneError: if there is no such folder.
     """
     names = list(names)
-    roots = [Path(name).expanduser() for name in names if name]
+    roots = [Path(expanduser(name)) for name in names if name]
     for root in roots:
         if not root.is_dir():
             raise SceneError(f"mesh_roots: there is no folder '{root}'")

@@ -4,6 +4,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
+from os.path import expanduser  # unlike that of Path it leaves a home that nobody knows as it is
 from pathlib import Path
 
 import numpy as np
@@ -213,7 +214,7 @@ class SandSimNode(LifecycleNode):
         if not (parameters["checkpoints"] or parameters["resume"]):
             return None
         period = parameters["checkpoint_period"] if parameters["checkpoints"] else np.inf
-        folder = CheckpointFolder(Path(parameters["states"]).expanduser(), scene, period, self.get_logger().info)
+        folder = CheckpointFolder(Path(expanduser(parameters["states"])), scene, period, self.get_logger().info)
         self._endings.callback(folder.close)
         return folder
 
@@ -229,7 +230,7 @@ class SandSimNode(LifecycleNode):
         self._endings.callback(self._bed.close)
         inputs = ToolInputs(connections, parameters, self.simulation, lambda: self._active, frames, lambda: self._last)
         services = Services(self, connections, self.simulation, self.hold)
-        ChangeServices(connections, services, self.simulation, Path(parameters["states"]).expanduser())
+        ChangeServices(connections, services, self.simulation, Path(expanduser(parameters["states"])))
         if simulation_interfaces.srv is None:
             self.get_logger().info("simulation_interfaces is not installed: its services are absent", once=True)
         else:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from itertools import chain, count
+from os.path import expanduser  # unlike that of Path it leaves a home that nobody knows as it is
 from pathlib import Path
 
 
@@ -24,9 +25,7 @@ class RunFiles:
             parameters: of the node.
             scene: its name, which is that of the files in the output folder.
         """
-        recording, output = (
-            Path(parameters[name]).expanduser() if parameters[name] else None for name in ("recording", "output")
-        )
+        recording, output = (Path(expanduser(parameters[name])) if parameters[name] else None for name in ("recording", "output"))
         if recording and (parameters["resume"] or recording in self._written):
             path = recording
             recording = self._unused(path, chain([path], (path.with_stem(f"{path.stem}.{number}") for number in count(2))))

@@ -156,6 +156,8 @@ def test_missing_file_is_refused(tmp_path, monkeypatch):
             SceneError, match=f"scene '{name}': there is no such file in {tmp_path}; the package's own scenes are"
         ):
             find_scene(name)
+    with pytest.raises(SceneError, match=r"'~nobody/dig\.yaml': there is no such file"):
+        find_scene("~nobody/dig.yaml")
     (tmp_path / "mine.v2.yaml").write_text("")
     with pytest.raises(SceneError, match=r"there is no such file in .*; is 'mine\.v2\.yaml' meant\?"):
         find_scene("mine.v2")
