@@ -81,6 +81,7 @@ class Courses:
 
     Attributes:
         limited: number of commands that were slowed to keep to ``max_speed``.
+        delays: by how much later than asked a tool got to where it was told to be for that, at most [s], by its name.
         unstamped: number of poses without a time that were carried out.
         alike: number of commands with the time of the one before, which have taken its place.
         shift: from the clock of relative stamps to simulated time [s]; None before the first of them.
@@ -89,6 +90,7 @@ class Courses:
     def __init__(self, world: World, lockstep: bool, rules: StampRules):
         self.lockstep, self.rules = lockstep, rules
         self.limited = self.unstamped = self.alike = 0
+        self.delays: dict[str, float] = {}
         self._world = world
         self.clear()
 
@@ -259,7 +261,9 @@ class Courses:
         now = self._world.time
         soonest = self._world.travel(pose) / self._world.scene.tool(pose.tool).max_speed
         self._world.apply(replace(pose, time=max(end, now + soonest)))
-        self.limited += soonest > 1.000001 * (end - now)
+        if soonest > 1.000001 * (end - now):
+            self.limited += 1
+            self.delays[pose.tool] = max(self.delays.get(pose.tool, 0.0), now + soonest - end)
 
     def _pose_within_reach(self, velocity: ToolVelocity, duration: float) -> ToolPose:
         """Where a velocity leads, made smaller in its direction if it is above ``max_speed``."""

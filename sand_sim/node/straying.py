@@ -1,11 +1,17 @@
-"""Tools that have left the domain, where alone grains are: mostly of poses in millimetres, or of another frame."""
+"""Tools that are not where somebody means them to be, mostly because of poses in millimetres or of another frame.
+
+Those that have left the domain, where alone grains are, and those that go on at ``max_speed`` long after they should be there.
+"""
 
 from collections.abc import Callable
 
 import numpy as np
 
 from sand_sim.border import ToolReport
+from sand_sim.courses import Courses
 from sand_sim.world import World
+
+_LATE = 1.0  # [s]; the first pose of a stream may well be some distance away
 
 
 class StrayWatch:
@@ -35,3 +41,27 @@ class StrayWatch:
                         "and of the frame that they name, or give the scene a larger 'domain'"
                     )
         return strayed
+
+
+class DelayWatch:
+    """Warns once of each tool that is told to go where it cannot be in time, which shows in no other way than that it is slow.
+
+    Args:
+        world: that the tools are in.
+        warn: takes what there is to say.
+    """
+
+    def __init__(self, world: World, warn: Callable[[str], None]):
+        self._world, self._warn = world, warn
+        self._told: set[str] = set()
+
+    def look(self, courses: Courses) -> None:
+        """To be asked from time to time."""
+        for tool, delay in dict(courses.delays).items():
+            if delay > _LATE and tool not in self._told:
+                self._told.add(tool)
+                self._warn(
+                    f"tool '{tool}' is told to go where it gets {delay:.1f} s later than asked at its max_speed of "
+                    f"{self._world.scene.tool(tool).max_speed:g} m/s; see that its poses are in metres, of the frame that they "
+                    "name, and begin where the tool is (pose_actual), or raise max_speed in the scene"
+                )
