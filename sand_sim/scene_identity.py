@@ -5,6 +5,7 @@ from the same state: trajectories, duration, frame rate, threads, device.
 """
 
 import hashlib
+import json
 import math
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
@@ -55,6 +56,11 @@ def describe_scene(assembly: Assembly) -> dict:
             | {f"terrain {ground.name}": len(ground.body) for ground in assembly.grounds},
         }
     )
+
+
+def digest(description: dict) -> np.ndarray:
+    """What tells one description from others, shape (32,), uint8."""
+    return np.frombuffer(hashlib.sha256(json.dumps(description, sort_keys=True).encode()).digest(), np.uint8)
 
 
 def find_difference(before: object, now: object, where: str = "") -> str:

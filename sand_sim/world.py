@@ -26,7 +26,7 @@ from sand_sim.observing import (
     start_energy,
 )
 from sand_sim.scene.types import Scene
-from sand_sim.scene_identity import describe_scene
+from sand_sim.scene_identity import describe_scene, digest
 from sand_sim.settling import settle
 from sand_sim.sweeping import SweptGround
 from sand_sim.tool_model import Progress, ToolModel
@@ -70,6 +70,7 @@ class World(Changeable):
         self._swept = SweptGround(observe_spheres(self.assembly), self.assembly.tools, self._poses)
         self._loaded = replace(self.assembly, solver=None)
         self.identity = describe_scene(self._loaded)
+        self._digest = digest(self.identity)
         self._models: dict[tuple[int, str, float], ToolModel] = {}
         self._initial = self.save()
         self.reset()
@@ -253,9 +254,8 @@ class World(Changeable):
         for name in Track.__dataclass_fields__:
             state[f"track.{name}"] = np.array([getattr(track, name) for track in self._tracks])
         self._sweep()
-        state |= self._swept.save() | describe_changes(self.assembly, self._loaded)
-        state["start"] = np.array(astuple(self._start))
-        state["observed_steps"] = np.array(self._observed_steps)
+        state |= self._swept.save() | describe_changes(self.assembly, self._loaded) | {"scene": self._digest}
+        state["start"], state["observed_steps"] = np.array(astuple(self._start)), np.array(self._observed_steps)
         if self._observed_wrench is not None:
             state["observed_wrench"] = self._observed_wrench
         return state

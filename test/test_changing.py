@@ -298,8 +298,13 @@ def test_state_of_another_scene_is_refused(tmp_path):
         other.restore({})
     springs = {"contact": {"rolling": "spring"}, "numbers": {"rolling_friction": 0.1}}
     law = World(read_scene(maker.scene([[0.0, 0.0, 0.1]], SMALL, **wide, **springs), tmp_path))
+    unsigned = {name: rows for name, rows in law.save().items() if name != "scene"}  # as older states are
     with pytest.raises(ValueError, match=r"array '.*memory' is float"):
-        other.restore(law.save())
+        other.restore(unsigned)
+    rough = World(read_scene(maker.scene([[0.0, 0.0, 0.1]], SMALL, **wide, numbers={"friction": 0.9}), tmp_path))
+    for put in (other.restore, other.check_state):
+        with pytest.raises(ValueError, match="state: is of another scene: a material, law, wall, mesh or other field differs"):
+            put(rough.save())
     assert same_state(other.save(), before)
 
 

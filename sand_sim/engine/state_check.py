@@ -17,8 +17,13 @@ def check_layout(state: dict[str, np.ndarray], like: dict[str, np.ndarray]) -> N
         like: a state of the world; contact lists, and only those, may be longer or shorter.
 
     Raises:
-        StateError: naming the first array that does not fit.
+        StateError: naming the first array that does not fit, or if the state is of another scene.
     """
+    if "scene" in like and not np.array_equal(state.get("scene"), like["scene"]):
+        raise StateError(
+            "state: is of another scene: a material, law, wall, mesh or other field differs that decides where grains go; "
+            "a bed goes into other scenes by a file of its grains, see 'fills'"
+        )
     if state.keys() != like.keys():
         raise StateError(f"array '{min(state.keys() ^ like.keys())}' is missing or not wanted")
     for name, array in state.items():
