@@ -109,6 +109,12 @@ class Courses:
         """Time up to which every tool that has been commanded knows where to go [s]; minus infinity if none has been."""
         return min((course.promised for course in self.by_tool.values() if course.promised > -np.inf), default=-np.inf)
 
+    def awaited(self) -> list[str]:
+        """Tools without whose next command time does not go on in lockstep; all while none is driven."""
+        driven = {name: course.promised for name, course in dict(self.by_tool).items() if course.promised > -np.inf}
+        soon = self._world.time + self._world.time_step
+        return [name for name, promised in driven.items() if promised < soon] if driven else [*self.by_tool]
+
     def next_begin(self) -> float:
         """When the next waiting command begins [s]; infinity if none waits."""
         return min((self._world.arrival(name) for name, course in self.by_tool.items() if course.waiting), default=np.inf)

@@ -53,6 +53,15 @@ def velocity(linear, angular=(0.0, 0.0, 0.0), in_tool_frame=False, at=None):
     return ToolVelocity("plate", np.array(linear), np.array(angular), in_tool_frame, at)
 
 
+def test_lockstep_tells_whom_it_waits_for(tmp_path):
+    driven = Driven(tmp_path, lockstep=True)
+    assert driven.courses.awaited() == ["plate"]
+    driven.take(pose(0.0, 0.02))
+    assert driven.courses.awaited() == []
+    driven.go_to(0.02)
+    assert driven.courses.awaited() == ["plate"]
+
+
 @pytest.mark.parametrize(
     ("commands", "reason"),
     [

@@ -52,8 +52,7 @@ class Diagnosis:
             "last rejection": simulation.last_rejection,
         } | {f"commands rejected: {reason}": str(count) for reason, count in rejected.items()}
         device = simulation.world.assembly.solver.device.label
-        state = "paused" if simulation.paused else "running"
-        message = health_to_diagnostics(last.health, last.time, f"{self._name}: world", device, further, state)
+        message = health_to_diagnostics(last.health, last.time, f"{self._name}: world", device, further, self._state())
         status = message.status[0]
         for trouble in filter(None, (self._lag.look(last.time), *unwritten)):
             status.message = trouble if status.level == DiagnosticStatus.OK else f"{status.message}; {trouble}"
@@ -62,6 +61,16 @@ class Diagnosis:
             status.level = DiagnosticStatus.ERROR
             status.message = f"stepping has stopped: {simulation.fault}"
         return message
+
+    def _state(self) -> str:
+        if self._simulation.paused:
+            return "paused"
+        if self._simulation.pacing != "lockstep":
+            return "running"
+        if not self._simulation.courses.by_tool:
+            return "in lockstep: waiting for ~/step"
+        awaited = self._simulation.courses.awaited()
+        return f"in lockstep: waiting for the next command of {', '.join(awaited)}" if awaited else "running"
 
     def _real_time_factor(self, simulated: float) -> float:
         """Since the last time it was asked; 0 after a reset."""

@@ -114,7 +114,12 @@ def test_step_reset_and_pause_services(client, start_node):
     assert client.call(Trigger, "reset").success
     client.wait_for(lambda: client.time == 0.0)
     assert node.simulation.world.time == 0.0
-    client.wait_for(lambda: client.diagnostics and client.diagnostics[-1].status[0].message == "running")
+    client.wait_for(
+        lambda: (
+            client.diagnostics
+            and client.diagnostics[-1].status[0].message == "in lockstep: waiting for the next command of plate"
+        )
+    )
     assert client.call(Trigger, "pause").message == "paused"
     client.wait_for(lambda: client.diagnostics[-1].status[0].message == "paused")
     client.send(START, at=0.1)
