@@ -60,8 +60,9 @@ def allowed_mesh(uri: str, roots: Sequence[Path], packages: bool) -> Path:
     if existing:
         return existing[0]
     if not (found and all(allowed for _, allowed in found)):
-        allowed = ", ".join([*map(str, roots), *(["the share folders of ROS packages"] if packages else [])]) or "none"
-        hint = "use package://, or name" if packages else "name"
+        shares = ["the share folders of ROS packages"] if packages else []
+        allowed = ", ".join(dict.fromkeys([*map(str, roots), *shares])) or "none"
+        hint = "put it there, use package://, or name" if packages else "name"
         raise SceneError(
             f"{name}: lies outside the folders that meshes may come from ({allowed}); {hint} its folder in the parameter "
             "mesh_roots"

@@ -161,3 +161,11 @@ def test_whatever_address_comes_leads_into_a_root_or_nowhere(uri):
         assert str(error).isprintable()
     else:
         assert found.is_relative_to(root.resolve())
+
+
+def test_a_refusal_names_each_folder_once_and_where_to_put_the_file(tmp_path):
+    """The folder of a scene and that of its URDF are mostly one, and only the node has the parameter."""
+    with pytest.raises(SceneError) as caught:
+        allowed_mesh("/etc/passwd", [tmp_path, tmp_path], True)
+    assert str(caught.value).count(str(tmp_path)) == 1
+    assert "put it there, use package://, or name its folder in the parameter mesh_roots" in str(caught.value)
