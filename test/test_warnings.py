@@ -32,6 +32,18 @@ LIQUID = {"bridge_volume": 0.01}
             {"material": {"density": 2.6, "young": 1e7, "poisson": 0.25}},
             ["materials.grain: a density of 2.6 kg/m.3 is that of a foam; is it in g/cm.3\\?$"],
         ),
+        (
+            {"material": {"density": 2600, "young": 70.0, "poisson": 0.25}},
+            ["materials.grain: a young of 70 Pa is that of a jelly; is it in MPa or GPa\\?$"],
+        ),
+        (
+            {"liquid": LIQUID | {"surface_tension": 72}, "contact": {"cohesion": "capillary"}},
+            ["liquid: no liquid has a surface_tension of 72 N/m; is it in mN/m\\?$"],
+        ),
+        (
+            {"numbers": {"adhesion": 50.0}, "contact": {"cohesion": "dmt"}},
+            [f"pairs: 'grain' and '{other}' have an adhesion of 50 J/m.2, .* is it in mJ/m.2\\?$" for other in ("grain", "wall")],
+        ),
         ({"numbers": {"adhesion": 0.1}}, ["pairs: 'adhesion' has no effect; .* say cohesion: dmt, or cohesion: jkr$"]),
         ({"liquid": LIQUID, "contact": {"cohesion": "capillary"}}, []),
         ({"liquid": LIQUID}, ["liquid: has no effect; the section 'contact' would have to say cohesion: capillary$"]),

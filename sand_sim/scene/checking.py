@@ -52,7 +52,9 @@ def check_scene(scene: Scene) -> None:
                 raise SceneError(f"domain: must contain the region of fill '{fill.name}', its grains would be retired at once")
 
 
-_STEEP, _LIGHT = 5.0, 10.0  # friction, and density [kg/m^3], from which another unit is more likely meant
+# From where on another unit is more likely meant: friction, density [kg/m^3], Young's modulus [Pa], surface tension [N/m] and
+# adhesion [J/m^2]; molten metals pull with up to 2.5 N/m.
+_STEEP, _LIGHT, _SOFT, _TENSE, _STICKY = 5.0, 10.0, 1.0e3, 5.0, 10.0
 
 
 def odd_numbers(scene: Scene) -> list[str]:
@@ -63,10 +65,20 @@ def odd_numbers(scene: Scene) -> list[str]:
         for (a, b), value in steep
         if value >= _STEEP
     ]
-    light = [one for one in scene.materials if one.density < _LIGHT]
-    return told + [
-        f"materials.{one.name}: a density of {one.density:g} kg/m^3 is that of a foam; is it in g/cm^3?" for one in light
+    sticky = [(rule.between, rule.numbers.get("adhesion", 0.0)) for rule in scene.pairs]
+    told += [
+        f"pairs: '{a}' and '{b}' have an adhesion of {value:g} J/m^2, a thousand times that of sticky solids; is it in mJ/m^2?"
+        for (a, b), value in sticky
+        if value >= _STICKY
     ]
+    for one in scene.materials:
+        if one.density < _LIGHT:
+            told.append(f"materials.{one.name}: a density of {one.density:g} kg/m^3 is that of a foam; is it in g/cm^3?")
+        if one.young < _SOFT:
+            told.append(f"materials.{one.name}: a young of {one.young:g} Pa is that of a jelly; is it in MPa or GPa?")
+    if scene.liquid is not None and scene.liquid.surface_tension >= _TENSE:
+        told.append(f"liquid: no liquid has a surface_tension of {scene.liquid.surface_tension:g} N/m; is it in mN/m?")
+    return told
 
 
 def unused_numbers(scene: Scene) -> list[str]:
