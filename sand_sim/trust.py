@@ -8,6 +8,7 @@ from sand_sim.scene.stable_step import DEEP
 GAINED = 0.01  # share of the energy handled that may appear from nowhere
 HASTY = 2.0  # times the step that the present top speed asks for
 UNBALANCED = 1e-3  # of all forces that may be without a cause
+_CRUSHED = 0.5  # of a radius, more than any bed bears by its own weight
 BLOWN_UP = 0.5  # share beyond which the run is stopped
 
 
@@ -23,7 +24,10 @@ def find_doubts(health: Health, safe_now: float, beforehand: tuple[str, ...] = (
     if health.step_ratio > 1.0001:
         doubts.append(f"time step is {health.step_ratio:.2g} times the safe one")
     if health.deepest > DEEP:
-        doubts.append(f"overlap reached {100.0 * health.deepest:.1f} % of a radius; stiffen the material or slow the tool")
+        remedy = "stiffen the material or slow the tool"
+        if health.deepest > _CRUSHED:
+            remedy += "; or does a tool crush grains against a wall, which it goes through?"
+        doubts.append(f"overlap reached {100.0 * health.deepest:.1f} % of a radius; {remedy}")
     if health.time_step > HASTY * safe_now:
         doubts.append(f"grains move at {health.fastest:.3g} m/s, which asks for a time step of {safe_now:.2g} s")
     if gained_share(health) > GAINED:
