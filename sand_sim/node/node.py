@@ -165,6 +165,8 @@ class SandSimNode(LifecycleNode):
 
     def _configure(self) -> None:
         parameters = self.parameters
+        if unsaid := parameters.unsaid():
+            self.get_logger().warning(unsaid)
         scene = load_scene(find_scene(parameters["scene"]))
         if parameters["threads"]:
             scene = replace(scene, solver=replace(scene.solver, threads=parameters["threads"]))

@@ -17,6 +17,7 @@ from sand_sim.simulation import PACINGS
 _OF_ROS = ("use_sim_time", "start_type_description_service")
 SOURCES = ("pose", "twist", "tf")
 WRENCH_FRAMES = ("tool", "world")
+_SCENE = "dig"
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Declaration:
 
 DECLARATIONS = (
     Declaration("autostart", True, "Configure and activate at once; otherwise wait for lifecycle transitions."),
-    Declaration("scene", "dig", "Scene file, or the name of one of the package's own scenes."),
+    Declaration("scene", _SCENE, "Scene file, or the name of one of the package's own scenes."),
     Declaration("pacing", "realtime", "How simulated time advances.", choices=PACINGS, changeable=True),
     Declaration("real_time_factor", 1.0, "Simulated over wall seconds in realtime pacing [1].", 0.001, 1000.0, changeable=True),
     Declaration("frame_id", "world", "Name of the world frame in all messages."),
@@ -142,6 +143,16 @@ class Parameters(Mapping):
             if frame in owners:
                 raise ValueError(f"parameter tools.{tool}.frame: '{frame}' is {owners[frame]} already; give the tool its own")
             owners[frame] = f"the frame of tool '{tool}'"
+
+    def unsaid(self) -> str:
+        """What to say where no scene was given, mostly because a file of parameters is for a node of another name; or empty."""
+        if "scene" in self._node._parameter_overrides or self._values["scene"] != _SCENE:
+            return ""
+        name = self._node.get_fully_qualified_name()
+        return (
+            f"no parameter 'scene' was given: this is the package's own '{_SCENE}'; what a file of parameters says counts only "
+            f"under '{name}' or '/**'"
+        )
 
     def misspelt(self) -> dict[str, str]:
         """Parameters that were given but that nobody has declared, and the most similar of those declared, or ''."""

@@ -30,6 +30,20 @@ def test_the_start_ends_where_the_user_wants_to_stop():
         Preparation(check, print)("compiling", 0.5)
 
 
+def test_a_file_of_parameters_for_another_name_is_not_taken_for_the_own_scene_in_silence(ros, tmp_path):
+    file = tmp_path / "parameters.yaml"
+    for name, silent in (("sand_sim_node", False), ("sand_sim", True), ("/**", True)):
+        file.write_text(f"{name}: {{ros__parameters: {{scene: mine.yaml}}}}\n")
+        node = SandSimNode(cli_args=["--ros-args", "--params-file", str(file)])
+        told = node.parameters.unsaid()
+        node.destroy_node()
+        assert (
+            not told
+            if silent
+            else "the package's own 'dig'; what a file of parameters says counts only under '/sand_sim'" in told
+        )
+
+
 @pytest.mark.parametrize(
     ("parameters", "told"),
     [
