@@ -35,14 +35,23 @@ class CheckpointFolder:
         folder: made if it is not there; no other process may use it meanwhile.
         name: of the scene; files are ``NAME.NUMBER.checkpoint``, the newest has the highest number.
         period: wall time between two checkpoints [s]; 0 for one each frame.
-        report: called from any thread with a line for the user, once for each trouble and once when it is over.
+        report: called from any thread with a line for the user.
+        warn: the same for what went wrong, once for each trouble; ``report`` if left out.
 
     Raises:
         CheckpointError: if the folder cannot be made or written to, or is in use.
     """
 
-    def __init__(self, folder: Path, name: str, period: float = PERIOD, report: Callable[[str], None] = lambda line: None):
+    def __init__(
+        self,
+        folder: Path,
+        name: str,
+        period: float = PERIOD,
+        report: Callable[[str], None] = lambda line: None,
+        warn: Callable[[str], None] | None = None,
+    ):
         self.folder, self.period, self._name, self._report = Path(folder), period, name, report
+        self._warn = report if warn is None else warn
         if not period >= 0.0:
             raise CheckpointError(f"period of checkpoints: must be 0 s or more, got {period:g}")
         self._pattern = re.compile(re.escape(name) + r"\.(\d+)\.checkpoint")
@@ -79,13 +88,15 @@ class CheckpointFolder:
         Raises:
             CheckpointError: if the newest good one was made in another scene.
         """
+        tell = self._report
         for path in self.files():
             try:
                 checkpoint = load_checkpoint(path, world, take_over)
             except OtherSceneError:
                 raise
             except CheckpointError as error:
-                self._report(f"{error}; the one before is tried")
+                tell = self._warn
+                tell(f"{error}; the one before is tried")
                 if isinstance(error, DamagedCheckpointError):
                     with contextlib.suppress(OSError):
                         path.replace(f"{path}.damaged")  # so that it does not count among those that are kept
@@ -93,7 +104,7 @@ class CheckpointFolder:
             self._last_steps = checkpoint.header["steps"]
             self._report(f"resumed from {path} at t = {checkpoint.time:.6f} s")
             return checkpoint
-        self._report(f"no checkpoint of '{self._name}' in {self.folder} to resume from, starting from the beginning")
+        tell(f"no checkpoint of '{self._name}' in {self.folder} to resume from, starting from the beginning")
         return None
 
     def due(self, steps: int, soon: bool = False) -> bool:
@@ -127,7 +138,7 @@ class CheckpointFolder:
             sync_folder(self.folder)
         except (CheckpointError, OSError) as error:
             if not self._failing:
-                self._report(f"{error}; the simulation goes on, the next checkpoint is tried again")
+                self._warn(f"{error}; the simulation goes on, the next checkpoint is tried again")
             self._failing = True
         else:
             if self._failing:

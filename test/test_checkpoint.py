@@ -256,13 +256,14 @@ def test_the_newest_are_kept_and_the_one_before_a_damaged_one_used(world, tmp_pa
     assert sorted(path.name for path in folder.iterdir()) == ["small.00000002.checkpoint", "small.00000003.checkpoint"]
     newest = folder / "small.00000003.checkpoint"
     newest.write_bytes(newest.read_bytes()[:-100])
-    checkpoints = CheckpointFolder(folder, "small", 0.0, told)
+    warned = Told()
+    checkpoints = CheckpointFolder(folder, "small", 0.0, told, warned)
     assert checkpoints.resume(world).time == pytest.approx(0.04)
     assert world.time == pytest.approx(0.04)
-    assert len(told) == 2
-    assert str(newest) in told[0]
-    assert "checksum" in told[0]
-    assert "resumed from" in told[1]
+    (warning,), (line,) = warned, told
+    assert str(newest) in warning
+    assert "checksum" in warning
+    assert "resumed from" in line
     play(world, 0.08)
     checkpoints.offer(take_checkpoint(world))
     checkpoints.close()
@@ -276,6 +277,12 @@ def test_nothing_to_resume_from_is_said(world, tmp_path):
     checkpoints = CheckpointFolder(tmp_path, "small", 0.0, told)
     assert checkpoints.resume(world) is None
     assert "starting from the beginning" in told[0]
+    checkpoints.close()
+    (tmp_path / "small.00000001.checkpoint").write_bytes(b"")
+    warned = Told()
+    checkpoints = CheckpointFolder(tmp_path, "small", 0.0, told, warned)
+    assert checkpoints.resume(world) is None
+    assert "starting from the beginning" in warned[1], "though there was something"
     checkpoints.close()
 
 

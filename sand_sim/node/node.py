@@ -216,9 +216,10 @@ class SandSimNode(LifecycleNode):
         if not (parameters["checkpoints"] or parameters["resume"]):
             return None
         period = parameters["checkpoint_period"] if parameters["checkpoints"] else np.inf
-        folder = CheckpointFolder(Path(expanduser(parameters["states"])), scene, period, self.get_logger().info)
-        self._endings.callback(folder.close)
-        return folder
+        folder, logger = Path(expanduser(parameters["states"])), self.get_logger()
+        checkpoints = CheckpointFolder(folder, scene, period, logger.info, logger.warning)
+        self._endings.callback(checkpoints.close)
+        return checkpoints
 
     def _connect(self, world: World, frames: FrameTree) -> None:
         connections = Connections(self, in_haste=lambda: self.simulation.pacing == "lockstep")
