@@ -18,7 +18,7 @@ from sand_sim.interruption import Interruption
 from sand_sim.playing import commands_at, frame_times
 from sand_sim.report import progress_line, summary_text
 from sand_sim.scene.reading import load_scene
-from sand_sim.sinks.recorder import Recorder, RecordingError
+from sand_sim.sinks.recorder import Recorder, RecordingError, require_rerun
 from sand_sim.sinks.run_log import RunLog
 from sand_sim.world import World
 
@@ -56,6 +56,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         raise CheckpointError("--resume: give the folder to resume from with --checkpoint FOLDER")
     elif options.checkpoint_period is not None:
         raise CheckpointError("--checkpoint-period: give the folder for checkpoints with --checkpoint FOLDER")
+    recorded = _can_record(console.tell)
     world = World(scene, progress)
     log = RunLog(scene)
     if options.resume:
@@ -64,7 +65,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         console.tell(
             f"{options.checkpoint} holds checkpoints of an earlier run, which this one replaces; --resume would go on from them"
         )
-    recorder = _open_recorder(world, log, options, console.tell)
+    recorder = _open_recorder(world, log, options, recorded, console.tell)
     recorder.write(world.observe())
     for warning in world.warnings:
         console.tell(f"warning: {warning}")
@@ -99,11 +100,20 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     return 130 if interruption.asked else 0
 
 
-def _open_recorder(world: World, log: RunLog, options: argparse.Namespace, tell: Callable[[str], None]) -> Recorder:
-    """The run's recorder; a run that goes on writes a recording of its own beside the one that was broken off."""
-    name = f"{world.scene.name}.from-{world.time:.3f}s" if log.rows else world.scene.name
+def _can_record(tell: Callable[[str], None]) -> bool:
+    """Whether Rerun is there; told before the bed settles."""
     try:
-        return Recorder(world, options.out / f"{name}.rrd", options.out, options.view, options.particles, tell, log)
+        require_rerun()
     except RecordingError as error:
         tell(str(error))
-        return Recorder(world, output=options.out, report=tell, log=log)
+        return False
+    return True
+
+
+def _open_recorder(
+    world: World, log: RunLog, options: argparse.Namespace, recorded: bool, tell: Callable[[str], None]
+) -> Recorder:
+    """The run's recorder; a run that goes on writes a recording of its own beside the one that was broken off."""
+    name = f"{world.scene.name}.from-{world.time:.3f}s" if log.rows else world.scene.name
+    recording = options.out / f"{name}.rrd" if recorded else None
+    return Recorder(world, recording, options.out, options.view and recorded, options.particles, tell, log)

@@ -35,7 +35,7 @@ from sand_sim.node.tool_outputs import ToolOutputs
 from sand_sim.report import progress_line
 from sand_sim.scene.reading import load_scene
 from sand_sim.simulation import Simulation
-from sand_sim.sinks.recorder import Recorder
+from sand_sim.sinks.recorder import Recorder, require_rerun
 from sand_sim.world import World
 
 _DIAGNOSTICS_PERIOD = 1.0  # [s] wall
@@ -178,6 +178,8 @@ class SandSimNode(LifecycleNode):
         check_sources(parameters, tools)
         description, robot = read_robot(self, self._progress)
         checkpoints = self._open_checkpoints(scene.name)
+        if parameters["recording"] or parameters["view"]:
+            require_rerun()
         frames = fixed_frames(parameters, robot.fixed_frames() if robot else [])
         scene = replace(scene, robot_description=description, mesh_roots=tuple(parameters["mesh_roots"]))
         world = World(scene, self._progress)
@@ -219,6 +221,10 @@ class SandSimNode(LifecycleNode):
         folder, logger = Path(expanduser(parameters["states"])), self.get_logger()
         checkpoints = CheckpointFolder(folder, scene, period, logger.info, logger.warning)
         self._endings.callback(checkpoints.close)
+        if checkpoints.files() and not parameters["resume"]:
+            logger.warning(
+                f"{folder} holds checkpoints of an earlier run, which this one replaces; resume:=true goes on from them"
+            )
         return checkpoints
 
     def _connect(self, world: World, frames: FrameTree) -> None:

@@ -17,6 +17,20 @@ class RecordingError(ValueError):
     """A recording that cannot be made."""
 
 
+def require_rerun() -> None:
+    """See that recordings can be made, before the work begins that they are to be of.
+
+    Raises:
+        RecordingError: if Rerun cannot be imported.
+    """
+    try:
+        import rerun  # noqa: F401
+    except ImportError as error:
+        raise RecordingError(
+            f"recording: Rerun cannot be imported ({error}); pip install 'sand_sim[recording]', or leave recording and view empty"
+        ) from None
+
+
 class Recorder:
     """Writes observations to all sinks that are asked for.
 
@@ -129,13 +143,10 @@ def _open_sinks(
     world: World, recording: Path | None, view: bool, particles: bool, identity: str, report: Callable[[str], None]
 ) -> dict:
     """Sinks by the names that they are spoken of."""
-    try:
-        from sand_sim.sinks.recording_file import RecordingFile
-        from sand_sim.sinks.viewer import Viewer, open_viewer
-    except ImportError as error:
-        raise RecordingError(
-            f"recording: Rerun cannot be imported ({error}); pip install 'sand_sim[recording]', or leave recording and view empty"
-        ) from None
+    require_rerun()
+    from sand_sim.sinks.recording_file import RecordingFile
+    from sand_sim.sinks.viewer import Viewer, open_viewer
+
     sinks = {}
     if recording:
         sinks[f"recording {recording}"] = RecordingFile(recording, world, particles, identity)

@@ -164,6 +164,17 @@ def test_ctrl_c_keeps_what_was_recorded(tmp_path):
     assert "written: results/dig.rrd" in output
 
 
+def test_a_run_without_rerun_says_so_before_the_work_and_goes_on(tmp_path):
+    (tmp_path / "without" / "rerun").mkdir(parents=True)
+    (tmp_path / "without" / "rerun" / "__init__.py").write_text("raise ImportError('not there')")
+    scene = write_small_scene(tmp_path, duration=0.1)
+    environment = os.environ | {"PYTHONPATH": str(tmp_path / "without")}
+    code, output, errors = finish(sand_sim(tmp_path, "run", scene, env=environment))
+    assert code == 0, errors
+    assert errors.startswith("recording: Rerun cannot be imported (not there); pip install 'sand_sim[recording]'")
+    assert "written: out/small.npz" in output
+
+
 def test_demo_drives_the_node_through_ros(tmp_path):
     pytest.importorskip("rclpy", reason="needs ROS 2")
     scene = write_small_scene(tmp_path)

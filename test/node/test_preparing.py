@@ -1,5 +1,7 @@
 """What a node says while it prepares itself."""
 
+import sys
+
 import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
@@ -52,11 +54,13 @@ def test_a_file_of_parameters_for_another_name_is_not_taken_for_the_own_scene_in
             {"frame_names": ["base"], "frames.base.parent": "odom"},
             r"parameter frames.base.parent: .* nothing tells where 'odom' is",
         ),
+        ({"recording": "run.rrd"}, "recording: Rerun cannot be imported"),
         ({"checkpoints": True, "states": "/dev/null/states"}, "checkpoint folder /dev/null/states: "),
     ],
 )
 def test_what_cannot_be_is_refused_before_the_work_begins(ros, tmp_path, monkeypatch, parameters, told):
     monkeypatch.setattr("msg_adapters.tf2_msgs.TFMessage", None)
+    monkeypatch.setitem(sys.modules, "rerun", None)
     stages = []
     given = parameters | {"scene": str(write_small_scene(tmp_path))}
     overrides = [Parameter(name, value=value) for name, value in given.items()]
