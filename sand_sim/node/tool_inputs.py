@@ -13,6 +13,7 @@ from sand_sim.border import CommandError, Frame, Observation, ToolPose
 from sand_sim.frames import FrameTree
 from sand_sim.node.connections import Connections
 from sand_sim.node.parameters import Parameters, frame_declarations
+from sand_sim.scene.reading_poses import in_degrees
 from sand_sim.simulation import Simulation
 
 _NO_MOVE, _NO_TURN = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
@@ -168,6 +169,8 @@ def fixed_frames(parameters: Parameters, of_robot: Sequence[Frame] = ()) -> Fram
     for name in names:
         parameters.declare(frame_declarations(name))
         pose = np.array(parameters[f"frames.{name}.pose"])
+        if doubt := in_degrees(pose[3:].tolist()):
+            raise ValueError(f"parameter frames.{name}.pose: roll pitch yaw {doubt}")
         parent = parameters[f"frames.{name}.parent"] or tree.root
         try:
             tree.put(Frame(name, parent, pose[:3], rotation.from_rpy(*pose[3:])))

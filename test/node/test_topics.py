@@ -209,6 +209,10 @@ def test_poses_in_fixed_frames(client, start_node):
 @pytest.mark.parametrize(
     ("parameters", "named"),
     [
+        (
+            {"frame_names": ["base"], "frames.base.pose": [0.0, 0.0, 0.0, 0.0, 0.0, 90.0]},
+            r"parameter frames.base.pose: .* in degrees it would be \[0.0, 0.0, 1.5708\]",
+        ),
         ({"frame_names": ["base"], "frames.base.parent": "moon"}, "frames.base.parent: frame 'base' does not hang on 'world'"),
         ({"frame_names": ["world"]}, "frames.world: frame 'world' in 'world': needs two different names"),
         ({"frame_names": ["base"], "frames.base.pose": [1.0]}, "frames.base.pose: must be 6 finite numbers"),
