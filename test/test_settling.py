@@ -5,12 +5,11 @@ import pytest
 from scenes import SceneMaker, floor
 
 from sand_sim import World, read_scene
-from sand_sim.scene.types import SceneError
+from sand_sim.scene.filling import fill_grains
 
 RADIUS, GRAVITY = 0.02, 9.81
-DOWN = [0.0, 0.0, -GRAVITY]
-BALL = [[0.0, 0.0, 0.0, 0.006]]
-BELL = [[-0.006, 0.0, 0.0, 0.005], [0.006, 0.0, 0.0, 0.005]]
+WIDE = {"low": [-0.1] * 3, "high": [0.1] * 3}
+ROOMY = {"low": [-0.1] * 3, "high": [0.4] * 3}
 
 
 def silo(tmp_path, **settle):
@@ -51,7 +50,7 @@ def test_grains_fall_as_fast_as_asked(make_world, integrator, kind):
     if kind == "body":
         spheres = [[-0.004, 0.0, 0.0, 0.005], [0.004, 0.0, 0.0, 0.005]]
         further["bodies"] = {"bell": {"spheres": spheres, "material": "grain", "pose": {"position": [0.05, 0.0, 0.0]}}}
-    world = make_world([[0.0, 0.0, 0.0]], 0.005, domain={"low": [-0.1] * 3, "high": [0.1] * 3}, **further)
+    world = make_world([[0.0, 0.0, 0.0]], 0.005, domain=WIDE, **further)
     expected = fastest * (1.0 - np.exp(-GRAVITY * time / fastest))
     assert world.observe().grains.velocity[-1, 2] == pytest.approx(-expected, rel=0.05)
 
@@ -63,100 +62,82 @@ def test_time_zero_is_free_of_drag(make_world):
     assert world.observe().grains.velocity[0, 2] == pytest.approx(begin - GRAVITY * world.time, rel=1e-6)
 
 
-def bed_and(make_world, time=0.5, **further):
-    """Two layers of grains that fall on to a floor, and what else there is."""
-    lattice = 0.0105 * (np.stack(np.meshgrid(range(4), range(4), range(2), indexing="ij"), -1).reshape(-1, 3) - [1.5, 1.5, 0.0])
-    further |= {"settle": {"time": time, "speed": 1e-4}} if time else {}
-    domain = {"low": [-0.3, -0.3, -0.05], "high": [0.3, 0.3, 0.3]}
-    return make_world(
-        lattice + [0.0, 0.0, 0.02],
-        0.005,
-        boundaries=floor(),
-        gravity=DOWN,
-        restitution=0.3,
-        friction=0.5,
-        domain=domain,
-        **further,
-    )
+def test_a_liquid_that_slows_grains_within_a_chunk_takes_no_longer_than_asked(make_world):
+    """``z = v_0 t - v_0^2/g (1 - exp(-g t / v_0))``; drag is applied anew sooner than it is looked whether all rest."""
+    fastest, time = 0.02, 0.05
+    settle = {"time": time, "fall": fastest, "speed": 1e-6}
+    world = make_world([[0.0, 0.0, 0.0]], 0.005, gravity=[0.0, 0.0, -GRAVITY], domain=WIDE, settle=settle)
+    expected = fastest * (time - fastest / GRAVITY * (1.0 - np.exp(-GRAVITY * time / fastest)))
+    assert world.observe().grains.position[0, 2] == pytest.approx(-expected, rel=0.03)
 
 
-@pytest.mark.parametrize("time", [0.5, 0.0])
-@pytest.mark.parametrize("integrator", ["velocity_verlet", "symplectic_euler"])
-@pytest.mark.parametrize("spheres", [BALL, BELL], ids=["ball", "bell"])
-def test_a_body_that_is_thrown_flies_from_time_zero_on(make_world, spheres, integrator, time):
-    """As Galilei says, while one that is let go of lies on the bed where that has settled, or falls with it where it has not."""
-    common = {"spheres": spheres, "material": "grain"}
-    thrown = common | {"pose": {"position": [0.0, 0.0, 0.2]}, "velocity": [0.1, 0.0, -1.0], "spin": [0.0, 4.0, 0.0]}
-    rock = common | {"pose": {"position": [0.005, 0.0, 0.06]}}
-    world = bed_and(make_world, time, bodies={"thrown": thrown, "rock": rock}, integrator=integrator)
-    start = world.observe()
-    assert not [warning for warning in world.warnings if "velocity" in warning]
-    assert start.body("thrown").position == pytest.approx([0.0, 0.0, 0.2], abs=1e-9)
-    assert start.body("thrown").velocity == pytest.approx([0.1, 0.0, -1.0])
-    assert start.body("rock").position[2] < 0.03 if time else start.body("rock").position[2] == pytest.approx(0.06)
-    world.step(round(0.05 / world.time_step))
-    seen, late = world.observe(), 0.5 * world.time_step * (integrator == "symplectic_euler")
-    fallen = world.time + 0.5 * GRAVITY * world.time * (world.time + 2.0 * late)
-    assert seen.body("thrown").position == pytest.approx([0.1 * world.time, 0.0, 0.2 - fallen], abs=1e-7)
-    assert seen.body("thrown").spin == pytest.approx([0.0, 4.0, 0.0])
-    half_angle = 0.5 * 4.0 * world.time
-    assert seen.body("thrown").orientation == pytest.approx([0.0, np.sin(half_angle), 0.0, np.cos(half_angle)], abs=1e-5)
-    assert seen.health.retired == 0
+def test_unless_told_grains_fall_at_a_share_of_the_speed_at_the_end_of_the_highest_fall(make_world):
+    """0.3 of ``sqrt(2 g h)``, for a grain above a floor ``h`` between its upper end and the floor and a radius more."""
+    height, time = 0.07, 0.05
+    further = {"boundaries": floor(-height), "gravity": [0.0, 0.0, -GRAVITY], "settle": {"time": time, "speed": 1e-6}}
+    world = make_world([[0.0, 0.0, 0.005]], 0.005, domain=WIDE, **further)
+    fastest = 0.3 * np.sqrt(2.0 * GRAVITY * (height + 0.01))
+    expected = fastest * (1.0 - np.exp(-GRAVITY * time / fastest))
+    assert world.observe().grains.velocity[0, 2] == pytest.approx(-expected, rel=0.03)
 
 
-@pytest.mark.parametrize("spheres", [BALL, BELL], ids=["ball", "bell"])
-def test_a_body_that_is_thrown_hits_the_bed_that_was_there_before(make_world, spheres):
-    ball = {"spheres": spheres, "material": "grain", "pose": {"position": [0.0, 0.0, 0.1]}, "velocity": [0.0, 0.0, -1.0]}
-    world = bed_and(make_world, bodies={"ball": ball})
-    bed = world.observe().grains.position[:-1]
-    assert bed[:, 2].max() < 0.016
-    world.step(round(0.05 / world.time_step))
-    np.testing.assert_allclose(world.observe().grains.position[:-1], bed, atol=2e-5)
-    world.step(round(0.3 / world.time_step))
-    moved = np.linalg.norm(world.observe().grains.position[:-1] - bed, axis=1)
-    assert moved.max() > 1e-3
-    assert world.observe().body("ball").position[2] > 0.0045
-    world.reset()
-    again = world.observe()
-    np.testing.assert_array_equal(again.grains.position[:-1], bed)
-    assert again.body("ball").position == pytest.approx([0.0, 0.0, 0.1], abs=1e-9)
+def test_the_speed_that_is_told_is_that_of_the_kinetic_energy_and_all_the_time_is_used(tmp_path):
+    """Masses 1 and 8 at 0.9 and 0.1 m/s: ``sqrt((0.9^2 + 8 0.1^2) / 9)``; no share of the work is left over."""
+    maker, told = SceneMaker(tmp_path), []
+    scene = maker.scene([[0.0, -0.05, 0.0], [0.0, 0.05, 0.0]], [0.004, 0.008], velocity=[[0.9, 0.0, 0.0], [0.0, 0.0, 0.1]])
+    scene |= {"domain": WIDE, "settle": {"time": 0.01, "speed": 0.31}}
+    world = World(read_scene(scene, tmp_path), lambda stage, share: told.append((stage, share)))
+    assert world.warnings[0].startswith("settle: grains still move at 0.31 m/s (root mean square) after 0.01 s")
+    assert [share for stage, share in told if stage == "settling"] == pytest.approx(np.arange(1, 51) / 50)
+    assert world.observe().grains.position[0, 0] == pytest.approx(0.009, rel=0.01)
 
 
-@pytest.mark.parametrize("spheres", [BALL, BELL], ids=["ball", "bell"])
-def test_a_body_that_is_thrown_is_as_it_would_be_without_a_bed(make_world, spheres):
-    """It meets the floor at once; others have left the domain before."""
-    ball = {"spheres": spheres, "material": "grain", "pose": {"position": [0.0, 0.0, 0.0061]}, "velocity": [0.2, 0.0, -1.0]}
-    disc = {"type": "hole_plate", "name": "disc", "material": "wall", "point": [0.0] * 3, "normal": [0.0, 0.0, 1.0]}
-    disc |= {"hole_radius": 0.0, "radius": 0.05}
-    place = {"domain": {"low": [-0.1] * 3, "high": [0.1] * 3}, "gravity": DOWN, "boundaries": [disc], "bodies": {"ball": ball}}
-    beside = [[0.04, 0.0, 0.005], [0.07, 0.0, 0.005], [-0.07, 0.0, 0.005]]
-    late, alone = (
-        make_world(grains, 0.005, time_step=2e-6, settle=settle, **place)
-        for grains, settle in ((beside, {"time": 0.3, "fall": "free"}), (beside[:1], {"time": 0.0}))
-    )
-    assert len(late.observe().grains) == 2
-    for _ in range(40):
-        worlds = [world.observe().body("ball") for world in (late, alone)]
-        for name in ("position", "velocity", "spin", "orientation"):
-            assert getattr(worlds[0], name) == pytest.approx(getattr(worlds[1], name), rel=1e-6, abs=1e-9), name
-        late.step(100)
-        alone.step(100)
-    assert late.observe().body("ball").velocity[2] > 0.2
+def test_a_grain_that_bounces_for_ever_never_rests(make_world):
+    """Slow at each of its four heights, 20 ms as long as it takes to turn, and not 80 ms."""
+    settle = {"time": 0.5, "speed": 0.1, "fall": "free"}
+    further = {"boundaries": floor(), "gravity": [0.0, 0.0, -GRAVITY], "restitution": 1.0, "settle": settle}
+    world = make_world([[0.0, 0.0, 0.025]], 0.005, **further)
+    assert [warning[:31] for warning in world.warnings] == ["settle: grains still move at 0."]
 
 
-def test_a_body_may_be_thrown_where_there_is_nothing_else(tmp_path):
-    ball = {"spheres": BALL, "material": "grain", "pose": {"position": [0.0, 0.0, 0.1]}, "velocity": [0.0, 0.0, -1.0]}
-    scene = SceneMaker(tmp_path).scene([[0.0, 0.0, 0.0]], 0.005, boundaries=floor(), gravity=DOWN, bodies={"ball": ball})
-    del scene["fills"]
-    world = World(read_scene(scene | {"settle": {"time": 0.5}}, tmp_path))
-    assert world.observe().body("ball").velocity == pytest.approx([0.0, 0.0, -1.0])
+def fills_of_three(kind):
+    """Two fills by height, the second of them not at z = 0, and one by count that reaches higher than both."""
+    region = [{"low": [x, 0.0, z], "high": [x + 0.06, 0.06, z + 0.2]} for x, z in ((0.0, 0.02), (0.1, 0.0), (0.2, -0.05))]
+    fills = [{"name": f"fill {k}", "material": "grain", "radius": 0.005, "region": region[k]} for k in range(3)]
+    how = ({"height": 0.032, "shape": kind}, {"count": 200, "seed": 1}, {"height": 0.047, "radius": {"uniform": [0.004, 0.005]}})
+    return [one | more for one, more in zip(fills, how, strict=True)]
+
+
+@pytest.mark.parametrize("kind", ["sphere", "tetrahedron"])
+def test_each_fill_is_struck_off_at_its_own_height_above_its_own_region(tmp_path, kind):
+    """What remains are the grains of each fill as it has been laid out, but for those that reach above that."""
+    fills = fills_of_three(kind)
+    scene = read_scene(SceneMaker(tmp_path).scene([[0.0, 0.0, 0.0]], 0.005) | {"fills": fills, "domain": ROOMY}, tmp_path)
+    world, expected = World(scene), []
+    for fill in scene.fills:
+        table = fill_grains(fill, scene.materials[0], 0, [])
+        spheres = table.position[:, 2] + table.radius
+        if kind == "tetrahedron" and fill.shape == kind:
+            centre = table.bodies.position
+            spheres = centre[:, 2] + (np.linalg.norm(table.offset, axis=1) + table.radius).max()
+            table = table.bodies
+        keep = spheres <= fill.low[2] + fill.height if fill.height else np.ones(len(spheres), bool)
+        assert fill.height is None or 0 < keep.sum() < len(keep)
+        expected.append(table.position[keep])
+    assert world.observe().grains.position == pytest.approx(np.concatenate(expected), abs=1e-6)
     assert world.warnings == []
 
 
-def test_a_body_that_is_thrown_needs_room_in_the_settled_bed(make_world):
-    """Between the floor and grains that are still up as it is placed."""
-    ball = {"spheres": BALL, "material": "grain", "pose": {"position": [0.0, 0.0, 0.0065]}, "velocity": [1.0, 0.0, 0.0]}
-    with pytest.raises(
-        SceneError, match=r"bodies.ball: .* comes in when beds have settled, and overlaps grains then; place it higher"
-    ):
-        bed_and(make_world, bodies={"ball": ball})
+def test_how_high_a_fill_is_does_not_count_those_that_lie_higher(tmp_path):
+    """A grain on a shelf above a heap that has spread, whose region begins below zero."""
+    region = {"low": [0.0, 0.0, -0.02], "high": [0.05, 0.05, 0.3]}
+    shelf = {"type": "hole_plate", "name": "shelf", "material": "wall", "point": [0.2, 0.0, 0.2], "normal": [0.0, 0.0, 1.0]}
+    maker = SceneMaker(tmp_path)
+    scene = maker.scene([[0.2, 0.0, 0.205]], 0.005, gravity=[0.0, 0.0, -GRAVITY], precision="single", restitution=0.3)
+    scene["fills"].insert(0, {"name": "bed", "material": "grain", "radius": 0.005, "region": region, "height": 0.1})
+    scene |= {"boundaries": [*floor(-0.02), shelf | {"hole_radius": 0.0, "radius": 0.02}], "settle": {"time": 0.6, "speed": 0.02}}
+    world = World(read_scene(scene, tmp_path))
+    grains = world.observe().grains
+    top = (grains.position[:, 2] + grains.radius)[:-1].max() + 0.02
+    assert grains.position[-1, 2] > 0.2
+    assert world.warnings[-1].startswith(f"fills: 'bed' is only {top:.3g} m high, not 0.1 m; ")

@@ -15,9 +15,9 @@ SOUND = Health(1e-5, 1.0, 0.02, 1.0, 2.0, 3.0, 4.0, 5.0, 1e-9, 0.5, 123, 4, ())
     ("field", "limit", "told"),
     [
         ("step_ratio", 1.0001, "times the safe one"),
-        ("deepest", 0.1, "of a radius"),  # what the automatic time step is stable up to
-        ("gained", 0.01 * 10.0, "appeared from nowhere"),  # one percent of the energies above
-        ("momentum_residual", 1e-3, "have no counterpart"),
+        ("deepest", 0.1, "overlap reached 10.0 % of a radius"),  # what the automatic time step is stable up to
+        ("gained", 0.01 * 10.0, "0.1 J appeared from nowhere"),  # one percent of the energies above
+        ("momentum_residual", 1e-3, "0.1 % of the forces on grains have no counterpart"),
         ("time_step", 2.0 * 1e-5, "asks for a time step of 1e-05 s"),
     ],
 )
