@@ -141,3 +141,19 @@ def test_how_high_a_fill_is_does_not_count_those_that_lie_higher(tmp_path):
     top = (grains.position[:, 2] + grains.radius)[:-1].max() + 0.02
     assert grains.position[-1, 2] > 0.2
     assert world.warnings[-1].startswith(f"fills: 'bed' is only {top:.3g} m high, not 0.1 m; ")
+
+
+def test_what_happens_before_time_zero_counts_for_nothing_afterwards(make_world):
+    """A grain that has been pressed deep into the floor, and one that has fallen out of the domain with energy of its own."""
+    disc = {"type": "hole_plate", "name": "disc", "material": "wall", "point": [0.0] * 3, "normal": [0.0, 0.0, 1.0]}
+    further = {"boundaries": [disc | {"hole_radius": 0.0, "radius": 0.02}], "gravity": [0.0, 0.0, -GRAVITY], "restitution": 0.1}
+    further |= {"domain": WIDE, "settle": {"time": 0.5, "speed": 0.001, "fall": "free"}}
+    world = make_world([[0.0, 0.0, 0.0048], [0.05, 0.0, 0.005]], 0.005, **further)
+    health, weight = world.observe().health, 2500.0 * 4.0 / 3.0 * np.pi * 0.005**3 * GRAVITY
+    assert len(world.observe().grains) == 1
+    modulus = 1e7 / (1.0 - 0.25**2)
+    overlap = (0.75 * weight / (modulus * np.sqrt(0.005))) ** (2.0 / 3.0)  # Hertz's, on a rigid floor
+    assert health.deepest == pytest.approx(overlap / 0.005, rel=0.02)
+    assert health.retired == 0
+    assert abs(health.dissipated) < 1e-9 * weight
+    assert health.doubts == ()

@@ -158,6 +158,18 @@ def test_real_time_follows_the_wall_clock(scene):
         assert time.monotonic() - begin > 0.9
 
 
+def test_it_goes_on_at_once_from_a_later_state(scene, tmp_path):
+    """A frame takes a second of wall time; a clock that had gone on from time zero would stand still for 40 s."""
+    with Running(scene, "realtime", real_time_factor=0.02) as running:
+        for _ in range(40):
+            running.simulation.step().result(30.0)
+        path = running.simulation.save_state(tmp_path / "late.state").result(30.0)
+        running.simulation.reset().result(30.0)
+        begin = running.simulation.load_state(path).result(30.0)
+        running.wait_for(lambda shown: shown[-1].time > begin + 0.01, patience=10.0)
+        assert running.shown[-1].time == pytest.approx(begin + 0.02, abs=1e-4)
+
+
 def test_streamed_poses_are_reached_after_their_own_interval(scene):
     """Poses without stamps, every 20 ms of simulated time: the plate moves evenly at the commanded speed."""
     with Running(scene, "fast") as running:

@@ -149,7 +149,7 @@ def test_smooth_heights_are_where_they_are_said_to_be(make_ground, tmp_path):
     weight = observation.grains.mass[0] * GRAVITY
     assert observation.wall("ground").force == pytest.approx([0.0, 0.0, -weight], abs=1e-3 * weight)
     ground = world.assembly.grounds[0]
-    assert ground.mesh.is_watertight
+    assert ground.mesh.is_watertight and ground.mesh.is_winding_consistent
     assert ground.mesh.volume == pytest.approx(0.2 * 0.1 * (4.0 * 0.003 + 0.5 * 0.05))  # down to four particle radii
     at = np.array([[0.05, 0.05, 0.055 - 0.001], [0.05, 0.05, 0.055 + 0.001], [0.1, 0.05, 0.02]])
     assert ground.distance(at) == pytest.approx([-0.001 / steepness, 0.001 / steepness, -0.002], abs=1e-6)
@@ -184,3 +184,24 @@ def test_smooth_mesh_terrain_is_as_large_as_its_mesh(make_ground, tmp_path, shap
     world.step(round(0.3 / world.time_step))
     assert world.observe().grains.position[0] == pytest.approx(on_top, abs=1e-5)
     assert world.observe().health.doubts == ()
+
+
+def test_rough_grounds_are_a_particle_radius_nearer_than_their_meshes(make_ground, tmp_path):
+    """Flat heights, open, at z = 0.03; and a block 60 x 40 x 20 mm, closed, around the origin, at a place of its own."""
+    import trimesh
+
+    np.savez(tmp_path / "flat.npz", heights=np.full((ROWS, COLUMNS), 0.03))
+    ground = make_ground([[0.1, 0.05, 0.2]], {"heights": "flat.npz"}).assembly.grounds[0]
+    at = np.array([[0.07, 0.04, 0.05], [0.07, 0.04, 0.01], [0.23, 0.05, 0.07]])  # the last one beside the end of the grid
+    assert ground.distance(at) == pytest.approx([0.02 - 0.003, -0.02 - 0.003, 0.05 - 0.003], abs=1e-9)
+    assert ground.extent == pytest.approx(np.hypot(0.1, 0.05) + 0.003, abs=0.004)
+    trimesh.creation.box((0.06, 0.04, 0.02)).export(tmp_path / "block.stl")
+    block = {"mesh": "block.stl", "spacing": None, "pose": {"position": [0.3, 0.2, 0.1], "rpy": [0.0, 0.0, np.pi / 2]}}
+    ground = make_ground([[0.3, 0.2, 0.4]], block).assembly.grounds[0]
+    at = np.array([0.3, 0.2, 0.1]) + [[0.0, 0.0, 0.03], [0.0, 0.0, 0.009], [0.05, 0.0, 0.0], [0.0, 0.06, 0.0]]
+    assert ground.distance(at) == pytest.approx([0.02 - 0.003, -0.001 - 0.003, 0.03 - 0.003, 0.03 - 0.003], abs=1e-7)
+
+
+def test_a_ground_of_heights_is_not_said_to_be_a_sheet(make_ground, tmp_path):
+    np.savez(tmp_path / "valley.npz", heights=valley())
+    assert make_ground([[0.1, 0.05, 0.2]], {"heights": "valley.npz"}).warnings == []
