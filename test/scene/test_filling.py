@@ -1,6 +1,7 @@
 """How grains get into a scene."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -53,6 +54,28 @@ def test_sizes_follow_their_distribution(size, low, high, mean):
     assert radius.mean() == pytest.approx(mean, rel=0.02)
 
 
+def test_a_normal_distribution_is_cut_where_it_is_said_to_be():
+    """Above the mean: half of it is left, ``s sqrt(2/pi)`` below the mean on the mean, with a deviation ``s sqrt(1 - 2/pi)``."""
+    size = SizeDistribution("normal", mean=0.004, deviation=0.0003, low=0.001, high=0.004)
+    radius = fill_grains(fill(size=size, count=4000, high=(0.2, 0.2, 0.2)), SAND, 0, []).radius
+    assert radius.max() <= 0.004
+    assert radius.mean() == pytest.approx(0.004 - 0.0003 * np.sqrt(2.0 / np.pi), abs=0.0003 * 0.04)
+    assert radius.std() == pytest.approx(0.0003 * np.sqrt(1.0 - 2.0 / np.pi), rel=0.05)
+
+
+def test_grains_keep_clear_of_what_has_a_box():
+    """A ball that fills its box: places beside that are measured, too."""
+    centre, radius = np.array([0.1, 0.05, 0.05]), 0.02
+
+    def distance(points):
+        return np.linalg.norm(points - centre, axis=1) - radius
+
+    ball = SimpleNamespace(label="tool 'ball'", box=(centre - radius, centre + radius), distance=distance)
+    table = fill_grains(fill(count=600), SAND, 0, [ball])
+    assert distance(table.position).min() >= 0.005 * (1.0 - 1e-6)
+    assert distance(table.position).min() < 0.01
+
+
 def test_grains_keep_clear_of_walls():
     cylinder = Wall("cylinder", "pipe", "steel", np.array([0.1, 0.05, 0.0]), np.array([0.0, 0.0, 1.0]), 0.045)
     table = fill_grains(fill(count=100), SAND, 0, [cylinder])
@@ -76,6 +99,36 @@ def test_fine_grains_among_coarse_ones_share_their_places():
     assert place[:, 2].max() < 0.03  # some 380 places of 10.6 mm, 250 in a layer; 3000 would reach 0.12
     with pytest.raises(SceneError, match=r"has room for \d{5} loosely packed grains but 10000000000000 are wanted"):
         fill_grains(fill(count=10**13, **wide), SAND, 0, [pipe])
+
+
+def test_fine_grains_that_share_a_place_keep_clear_of_a_slanted_wall():
+    """Corners of a place may reach into it though the place itself is clear."""
+    size = SizeDistribution("table", radii=(0.00125, 0.0025, 0.005), weights=(30.0, 8.0, 1.0))
+    wall = Wall("plane", "slope", "steel", np.array([0.1, 0.05, 0.0]), np.array([1.0, 1.3, 0.4]) / np.sqrt(2.85))
+    table = fill_grains(fill(size=size, count=6000), SAND, 0, [wall])
+    for radius in size.radii:
+        nearest = wall.distance(table.position[table.radius == radius]).min()
+        assert radius * (1.0 - 1e-6) < nearest < 2.0 * radius
+
+
+@pytest.mark.parametrize(
+    ("walls", "share"), [([], 1.0), (["lid"], 1.0), (["pipe"], 0.25 * np.pi), (["pipe", "half"], 0.125 * np.pi)]
+)
+def test_a_fill_by_height_has_as_many_grains_as_settle_in_what_the_walls_leave(walls, share):
+    """0.61 of the volume up to the height is solid; planes that all of that lies before do not count."""
+    axis, point = np.array([0.0, 0.0, 1.0]), np.array([0.1, 0.2, 0.05])
+    known = {
+        "pipe": Wall("cylinder", "pipe", "steel", point, axis, 0.1),
+        "half": Wall("plane", "half", "steel", point, np.array([0.6, 0.8, 0.0])),
+        "lid": Wall("plane", "lid", "steel", np.array([0.0, 0.0, 0.25]), -axis),
+    }
+    floor_below = Wall("plane", "floor", "steel", np.array([0.0, 0.0, 0.04]), axis)
+    low, high = 0.003, 0.005
+    size, region = SizeDistribution("uniform", low=low, high=high), {"low": (0.0, 0.1, 0.05), "high": (0.2, 0.3, 0.3)}
+    bed = fill(size=size, height=0.06, **region)
+    table = fill_grains(bed, SAND, 0, [floor_below, *(known[name] for name in walls)])
+    grain = 4.0 / 3.0 * np.pi * (high**4 - low**4) / (4.0 * (high - low))
+    assert len(table) == pytest.approx(0.61 * share * 0.2 * 0.2 * 0.06 / grain, rel=0.02)
 
 
 @pytest.mark.parametrize("away", [0.0, 1e4])

@@ -12,6 +12,7 @@ from scenes import write_small_scene
 
 from sand_sim import SceneError, World, load_scene, read_scene
 from sand_sim.config_folder import config_folder, find_scene
+from sand_sim.scene.types import Fill, SizeDistribution
 
 
 def test_good_scene_is_read():
@@ -20,6 +21,39 @@ def test_good_scene_is_read():
     assert scene.pair("sand", "steel").numbers["friction"] == 0.2
     assert scene.gravity == (0.0, 0.0, -9.81)
     assert scene.tool("spade").scale == 1.0
+
+
+def test_all_that_a_fill_tells_is_read():
+    region = {"low": [0.0, 0.1, 0.2], "high": [0.3, 0.4, 0.5]}
+    entry = {"name": "bed", "material": "Coarse Sand", "radius": 0.004, "region": region, "height": 0.05}
+    entry |= {"shape": "tetrahedron", "velocity": [0.1, -0.2, 0.3], "seed": 7}
+    parsed = changed(("fills", 0), entry)
+    parsed["materials"]["Coarse Sand"] = parsed["materials"].pop("sand")
+    parsed["pairs"] = yaml.safe_load(yaml.safe_dump(parsed["pairs"]).replace("- sand", "- Coarse Sand"))
+    size = SizeDistribution("constant", mean=0.004)
+    expected = Fill(
+        "bed",
+        "Coarse Sand",
+        "tetrahedron",
+        size,
+        (0.0, 0.1, 0.2),
+        (0.3, 0.4, 0.5),
+        height=0.05,
+        velocity=(0.1, -0.2, 0.3),
+        seed=7,
+    )
+    assert read_scene(parsed, Path.cwd()).fills == (expected,)
+
+
+@pytest.mark.parametrize(("low", "high", "fits"), [(-0.1, 0.1, True), (0.1, 0.2, False)])
+def test_the_height_of_a_fill_is_that_above_its_region(low, high, fits):
+    region = {"low": [0.0, 0.0, low], "high": [0.1, 0.1, high]}
+    parsed = changed(("fills", 0), {"name": "bed", "material": "sand", "radius": 0.004, "region": region, "height": 0.15})
+    if fits:
+        assert read_scene(parsed, Path.cwd()).fills[0].height == 0.15
+        return
+    with pytest.raises(SceneError, match=r"'bed' height 0.15 m does not fit its region; raise region.high\[2\] above 0.25"):
+        read_scene(parsed, Path.cwd())
 
 
 @pytest.mark.parametrize(
@@ -45,6 +79,11 @@ def test_good_scene_is_read():
         (("pairs",), [GOOD["pairs"][0]], "pairs: no entry for 'sand' and 'steel'"),
         (("fills", 0, "radius"), -0.005, "fills[0].radius: must be greater than 0 [m]"),
         (("fills", 0, "radius"), {"uniform": [0.2, 0.1]}, "fills[0].radius: radii must be positive and in order"),
+        (
+            ("fills", 0, "radius"),  # (erf(3/sqrt(2)) - erf(2.4/sqrt(2))) / 2
+            {"normal": {"mean": 0.003, "deviation": 1e-4, "low": 0.00324, "high": 0.0033}},
+            "of a mean of 0.003 and a deviation of 0.0001 only 0.0068 lie between 0.00324 and 0.0033 [m], at least 0.01 must",
+        ),
         (
             ("fills", 0, "radius"),
             {"normal": {"mean": 0.003, "deviation": 1e-4, "low": 0.004, "high": 0.005}},

@@ -38,6 +38,9 @@ def test_plungers_and_terrains_need_names_of_their_own():
     parsed = changed(("boundaries",), [PLUNGER | {"velocity": 0.1}, PLUNGER | {"velocity": 0.2}])
     with pytest.raises(SceneError, match="'plunger' is the name of several; give the plunger a 'name' of its own"):
         read_scene(parsed, Path.cwd())
+    hill = TERRAIN | {"heights": "hill.csv", "spacing": 0.01}
+    with pytest.raises(SceneError, match="'terrain' is the name of several; give the terrain a 'name' of its own"):
+        read_scene(changed(("boundaries",), [hill, hill]), Path.cwd())
 
 
 @pytest.mark.parametrize(
