@@ -14,6 +14,8 @@ from sand_sim import SceneError, World, load_scene, read_scene
 from sand_sim.config_folder import config_folder, find_scene
 from sand_sim.scene.types import Fill, SizeDistribution
 
+STONE = {"spheres": [[0.0, 0.0, 0.0, 0.01]], "material": "sand", "pose": {"position": [0.0, 0.0, 0.1]}}
+
 
 def test_good_scene_is_read():
     scene = read_scene(copy.deepcopy(GOOD), Path.cwd())
@@ -43,6 +45,19 @@ def test_all_that_a_fill_tells_is_read():
         seed=7,
     )
     assert read_scene(parsed, Path.cwd()).fills == (expected,)
+
+
+def test_a_tool_meets_all_grains():
+    """Of the boundary's material or not."""
+    parsed = changed(("boundaries",), [])
+    parsed["pairs"].pop(1)
+    with pytest.raises(SceneError, match="pairs: no entry for 'sand' and 'steel', which can meet"):
+        read_scene(parsed, Path.cwd())
+
+
+def test_the_twist_of_mindlins_law_goes_with_it():
+    contact = {"twisting": "marshall", "tangential": "mindlin"}
+    assert read_scene(changed(("contact",), contact), Path.cwd()).contact.twisting == "marshall"
 
 
 @pytest.mark.parametrize(("low", "high", "fits"), [(-0.1, 0.1, True), (0.1, 0.2, False)])
@@ -102,6 +117,19 @@ def test_the_height_of_a_fill_is_that_above_its_region(low, high, fits):
         (("fills", 0, "count"), 2.5, "fills[0].count: must be a whole number"),
         (("fills", 0, "height"), 0.05, "fills[0]: give exactly one of 'count', 'height' and 'file'"),
         (("fills", 0, "material"), "gravel", "unknown material 'gravel'"),
+        (("tools", "spade", "material"), "gravel", "tools: 'spade' is of unknown material 'gravel'; known are sand, steel"),
+        (("bodies",), {"stone": STONE | {"material": "gravel"}}, "bodies: 'stone' is of unknown material 'gravel'"),
+        (("bodies",), {"stone": STONE | {"material": "steel"}}, "pairs: no entry for 'steel' and 'steel', which can meet"),
+        (
+            ("pairs",),
+            [*GOOD["pairs"], GOOD["pairs"][1] | {"between": ["sand", "steel"]}],
+            "pairs: sand and steel are given twice",
+        ),
+        (
+            ("contact",),
+            {"twisting": "marshall", "tangential": "none"},
+            "contact.twisting: 'marshall' is the twist of Mindlin's",
+        ),
         (("fills", 0, "region", "high"), [0.1, 0.1, -0.1], "fills[0].region: 'low'"),
         (("boundaries", 0, "type"), "sphere", "boundaries[0].type: unknown 'sphere'; known are plane, box, cylinder"),
         (
