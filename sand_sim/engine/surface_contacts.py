@@ -245,7 +245,7 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
                     dt,
                     share * overlap,
                     lane,
-                    overlap / radius,
+                    overlap / least,
                     memory,
                     force,
                     couple,

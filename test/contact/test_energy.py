@@ -68,3 +68,29 @@ def test_kinetic_and_elastic_energy_are_of_one_moment(make_world, integrator):
         assert health.kinetic + health.elastic == pytest.approx(start, rel=5e-3)
     assert max(stored) > 0.95 * start
     assert stored[-1] == 0.0
+
+
+@pytest.mark.parametrize("integrator", ["velocity_verlet", "symplectic_euler"])
+def test_energies_are_those_of_a_flying_spinning_ball(make_world, integrator):
+    """``m v^2/2 + (2/5) m r^2 w^2/2``; ``-m g . x`` against the start; of each grain of many, in more than one block of 256."""
+    number, radius, time = 300, 0.004, 0.02
+    position = np.column_stack([0.01 * np.arange(number), np.zeros(number), np.zeros(number)])
+    spin = np.column_stack([np.arange(number), -20.0 * np.ones(number), 0.5 * np.arange(number)])
+    velocity = np.column_stack([0.1 * np.ones(number), np.zeros(number), 0.002 * np.arange(number)])
+    gravity, domain = np.array([1.0, 0.0, -9.81]), {"low": [-1.0] * 3, "high": [5.0] * 3}
+    further = {"velocity": velocity, "spin": spin, "gravity": gravity.tolist(), "domain": domain, "integrator": integrator}
+    world = make_world(position, radius, **further)
+    mass = 2500.0 * 4.0 / 3.0 * np.pi * radius**3
+    turning = 0.5 * 0.4 * mass * radius**2 * np.sum(spin**2)
+    health = world.observe().health
+    assert health.kinetic == pytest.approx(0.5 * mass * np.sum(velocity**2) + turning, rel=1e-9)
+    assert health.potential == 0.0
+    assert turning > 0.2 * health.kinetic
+    assert health.fastest == pytest.approx(np.linalg.norm(velocity, axis=1).max(), rel=1e-9)
+    world.step(round(time / world.time_step))
+    after = world.observe().health
+    later = velocity + gravity * world.time
+    assert after.kinetic == pytest.approx(0.5 * mass * np.sum(later**2) + turning, rel=1e-6)
+    fallen = velocity * world.time + 0.5 * gravity * world.time**2
+    assert after.potential == pytest.approx(-mass * np.sum(fallen @ gravity), rel=2e-3)
+    assert after.fastest == pytest.approx(np.linalg.norm(later, axis=1).max(), rel=1e-6)

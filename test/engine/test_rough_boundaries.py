@@ -126,3 +126,32 @@ def test_rough_funnel_has_no_doubled_ring_at_its_seam(make_world):
 def test_gaps_that_grains_fall_through_are_refused(make_world):
     with pytest.raises(SceneError, match=r"boundaries: rough.spacing of 'plane', 0.02 m, leaves gaps for grains of radius 0.004"):
         make_world([[0, 0, 0]], RADIUS, boundaries=[wall("plane", rough={"radius": 0.003, "spacing": 0.02})], **LINEAR)
+
+
+@pytest.mark.parametrize("ball", [BALL, 2.0 * RADIUS])
+def test_a_virtual_sphere_is_met_as_one_that_never_moves(make_world, ball):
+    """Hertz's force with the radius of both, friction half an overlap inside of the grain, and overlaps by the smaller radius."""
+    overlap, young, poisson = 3e-4, 1e7, 0.25
+    rough = {"radius": ball, "spacing": 1.9 * ball, "lattice": "square"}
+    world = make_world(
+        [[0.0, 0.0, RADIUS + ball - overlap]],
+        RADIUS,
+        spin=[0.0, 1.0, 0.0],
+        material={"density": 2500.0, "young": young, "poisson": poisson},
+        boundaries=[wall("plane", [0.0, 0.0, 1.0], [0.0, 0.0, 0.0], rough=rough)],
+        domain=DOMAIN,
+        integrator="symplectic_euler",
+        time_step=1e-8,
+    )
+    before = world.observe()
+    expected = 4.0 / 3.0 * young / (1.0 - poisson**2) * np.sqrt(RADIUS * ball / (RADIUS + ball)) * overlap**1.5
+    assert before.wall("plane").force[2] == pytest.approx(-expected, rel=1e-6)
+    assert before.health.contacts == 1
+    world.step(10)
+    after = world.observe()
+    mass = after.grains.mass[0]
+    push = mass * (after.grains.velocity - before.grains.velocity)[0, 0]
+    couple = 0.4 * mass * RADIUS**2 * (after.grains.spin - before.grains.spin)[0, 1]
+    assert push > 0.0
+    assert -couple / push == pytest.approx(RADIUS - 0.5 * overlap, rel=1e-3)
+    assert after.health.deepest == pytest.approx(overlap / min(RADIUS, ball), rel=1e-3)
