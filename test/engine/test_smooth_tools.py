@@ -285,3 +285,19 @@ def test_a_sheet_is_as_thick_as_asked(make_smooth_world):
     expected = 0.0015 + RADIUS - resting_overlap(MASS * GRAVITY)
     assert observation.grains.position[0, 2] == pytest.approx(expected, abs=1e-8)
     assert observation.tool("tool").force == pytest.approx([0.0, 0.0, -MASS * GRAVITY], abs=1e-4 * MASS * GRAVITY)
+
+
+def test_overlaps_with_a_plate_that_turns_are_those_of_its_pose_at_that_time(make_smooth_world):
+    """A step sooner or later it would be 1e-7 m or more off: 2 rad/s, 30 mm from the axis."""
+    world = make_smooth_world([[0.03, 0.0, RADIUS - 1e-6]], plate(), time_step=2e-6)
+    angle, time = 0.02, 0.01
+    turn = np.array([0.0, -np.sin(0.5 * angle), 0.0, np.cos(0.5 * angle)])
+    world.apply(ToolPose("tool", np.zeros(3), turn, time))
+    for _ in range(5):
+        world.step(7)
+        now = world.time / time * angle
+        normal = np.array([-np.sin(now), 0.0, np.cos(now)])
+        contacts, position = world.tool_contacts("tool"), world.observe().grains.position[0]
+        assert contacts.overlap == pytest.approx([RADIUS - position @ normal], abs=1e-10)
+        assert contacts.normal == pytest.approx(normal[None], abs=1e-9)
+    assert now * 0.03 > 1e-6
