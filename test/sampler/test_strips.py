@@ -84,3 +84,13 @@ def test_pieces_smaller_than_the_spacing_count_as_one_particle_each():
 def test_what_is_wide_enough_stays_as_it_is(mesh):
     skin = Skin(np.asarray(mesh.triangles, float))
     assert with_rows(skin, H) is skin
+
+
+def test_what_is_wide_keeps_the_layers_it_counts_as_beside_strips():
+    """Front and back of a sheet in one place count as one; a strip beside it gets its row all the same."""
+    piece, wide = strip(0.2 * H, 0.2 * H), strip(2.0 * H, height=-5.0 * H)
+    sides = np.asarray(wide.triangles, float)
+    triangles = np.concatenate([np.asarray(piece.triangles, float), sides, sides[:, ::-1]])
+    areas = with_rows(Skin(triangles, "cpu", np.array([1.0] * 2 + [2.0] * 4)), H).areas
+    assert areas[:2].sum() == pytest.approx(0.87 * H**2)
+    assert areas[2:] == pytest.approx(np.full(4, 0.25 * 2.0 * H * LONG))
