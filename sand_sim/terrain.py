@@ -65,7 +65,9 @@ class Ground:
         local = position - self.place
         if self.smooth:
             return SignedDistance(trimesh.Trimesh(**trimesh.triangles.to_kwargs(self.surface))).query(local)[0]
-        if self.mesh.is_watertight:
+        if trimesh.Trimesh(
+            self.mesh.vertices, self.mesh.faces
+        ).is_watertight:  # an STL file gives each triangle corners of its own
             return SignedDistance(self.mesh).query(local)[0] - self.body.radius
         surface = Surface(np.asarray(self.mesh.triangles, float), "cpu")
         closest, face = surface.closest(local)

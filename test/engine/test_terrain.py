@@ -205,3 +205,17 @@ def test_rough_grounds_are_a_particle_radius_nearer_than_their_meshes(make_groun
 def test_a_ground_of_heights_is_not_said_to_be_a_sheet(make_ground, tmp_path):
     np.savez(tmp_path / "valley.npz", heights=valley())
     assert make_ground([[0.1, 0.05, 0.2]], {"heights": "valley.npz"}).warnings == []
+
+
+def test_beyond_the_sharp_edge_of_a_closed_block_it_is_outside_whatever_the_file(make_ground, tmp_path):
+    """A wedge of 10 degrees with its edge along y at x = 0: above and below, nearest to the edge, one face has its back there."""
+    import trimesh
+
+    x, z = 0.06, 0.06 * np.tan(np.radians(5.0))
+    corners = [[0.0, y, 0.0] for y in (-0.02, 0.02)] + [[x, y, side] for y in (-0.02, 0.02) for side in (-z, z)]
+    faces = [[0, 2, 3], [1, 5, 4], [2, 4, 5], [2, 5, 3], [0, 3, 5], [0, 5, 1], [0, 1, 4], [0, 4, 2]]
+    trimesh.Trimesh(corners, faces).export(tmp_path / "wedge.stl")
+    ground = make_ground([[0.0, 0.0, 0.1]], {"mesh": "wedge.stl", "spacing": None}).assembly.grounds[0]
+    at = np.array([[-0.01, 0.003, 0.005], [-0.01, 0.003, -0.005], [0.03, 0.0, 0.0]])
+    outside = np.hypot(0.01, 0.005) - 0.003
+    assert ground.distance(at) == pytest.approx([outside, outside, -0.03 * np.sin(np.radians(5.0)) - 0.003], abs=1e-7)
