@@ -65,9 +65,8 @@ class Ground:
         local = position - self.place
         if self.smooth:
             return SignedDistance(trimesh.Trimesh(**trimesh.triangles.to_kwargs(self.surface))).query(local)[0]
-        if trimesh.Trimesh(
-            self.mesh.vertices, self.mesh.faces
-        ).is_watertight:  # an STL file gives each triangle corners of its own
+        joined = trimesh.Trimesh(self.mesh.vertices, self.mesh.faces)  # an STL file gives each triangle corners of its own
+        if joined.is_watertight:
             return SignedDistance(self.mesh).query(local)[0] - self.body.radius
         surface = Surface(np.asarray(self.mesh.triangles, float), "cpu")
         closest, face = surface.closest(local)
