@@ -27,7 +27,7 @@ class Told:
         solver = SimpleNamespace(device=SimpleNamespace(label="a processor"))
         self.simulation = SimpleNamespace(
             world=SimpleNamespace(tools=[], assembly=SimpleNamespace(lattice=box, solver=solver)),
-            courses=SimpleNamespace(unstamped=0, limited=7, alike=8),
+            courses=SimpleNamespace(unstamped=0, limited=7, alike=8, delays={}),
             rejected=Counter(REFUSED),
             last_rejection="tool 'plate': too late",
             step_time=2.5e-4,
