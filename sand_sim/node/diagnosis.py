@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from msg_adapters.diagnostic_msgs import health_to_diagnostics
 from sand_sim.border import Observation
 from sand_sim.node.lag import LagWatch
-from sand_sim.node.straying import DelayWatch, StrayWatch
+from sand_sim.node.straying import StrayWatch
 from sand_sim.simulation import Simulation
 
 
@@ -26,7 +26,6 @@ class Diagnosis:
     def __init__(self, simulation: Simulation, name: str, warn: Callable[[str], None]):
         self._simulation, self._name = simulation, name
         self._lag, self._strays = LagWatch(simulation, warn), StrayWatch(simulation.world, warn)
-        self._delays = DelayWatch(simulation.world, warn)
         self._before = (time.monotonic(), 0.0)
 
     def tell(self, last: Observation, dropped: int, unwritten: list[str]) -> DiagnosticArray:
@@ -39,7 +38,7 @@ class Diagnosis:
         """
         simulation = self._simulation
         rejected = dict(simulation.rejected)
-        self._delays.look(simulation.courses)
+        self._strays.look_at_delays(simulation.courses)
         further = {
             "real-time factor": f"{self._real_time_factor(last.time):.4f}",
             "wall time of a step [us]": f"{1e6 * simulation.step_time:.4g}",

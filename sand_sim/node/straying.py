@@ -15,7 +15,7 @@ _LATE = 1.0  # [s]; the first pose of a stream may well be some distance away
 
 
 class StrayWatch:
-    """Warns once of each tool that is told to go where nothing is to be felt.
+    """Warns once of each tool that is told to go where nothing is to be felt, or where it cannot be in time.
 
     Args:
         world: that the tools are in.
@@ -25,6 +25,7 @@ class StrayWatch:
     def __init__(self, world: World, warn: Callable[[str], None]):
         self._world, self._warn = world, warn
         self._told: set[str] = set()
+        self._told_late: set[str] = set()
 
     def look(self, tools: tuple[ToolReport, ...]) -> list[str]:
         """Names of the tools that are wholly outside of the domain."""
@@ -42,24 +43,11 @@ class StrayWatch:
                     )
         return strayed
 
-
-class DelayWatch:
-    """Warns once of each tool that is told to go where it cannot be in time, which shows in no other way than that it is slow.
-
-    Args:
-        world: that the tools are in.
-        warn: takes what there is to say.
-    """
-
-    def __init__(self, world: World, warn: Callable[[str], None]):
-        self._world, self._warn = world, warn
-        self._told: set[str] = set()
-
-    def look(self, courses: Courses) -> None:
-        """To be asked from time to time."""
+    def look_at_delays(self, courses: Courses) -> None:
+        """Tools that cannot be in time where they are told to be show in no other way than that they are slow."""
         for tool, delay in dict(courses.delays).items():
-            if delay > _LATE and tool not in self._told:
-                self._told.add(tool)
+            if delay > _LATE and tool not in self._told_late:
+                self._told_late.add(tool)
                 self._warn(
                     f"tool '{tool}' is told to go where it gets {delay:.1f} s later than asked at its max_speed of "
                     f"{self._world.scene.tool(tool).max_speed:g} m/s; see that its poses are in metres, of the frame that they "

@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 
 from sand_sim import ToolPose, World, load_scene
 from sand_sim.courses import USUAL, Courses
-from sand_sim.node.straying import DelayWatch, StrayWatch
+from sand_sim.node.straying import StrayWatch
 
 
 def test_a_tool_that_has_left_the_domain_wholly_is_told_of_once(tmp_path):
@@ -36,12 +36,12 @@ def test_a_tool_that_has_left_the_domain_wholly_is_told_of_once(tmp_path):
 def test_a_tool_that_gets_where_it_is_told_much_too_late_is_told_of_once(tmp_path):
     """The first pose without a stamp is to be reached within a gap of 0.2 s, one that comes at the same time at once."""
     world, warned = World(load_scene(write_small_scene(tmp_path))), []
-    courses, watch, (plate,) = Courses(world, False, USUAL), DelayWatch(world, warned.append), world.observe().tools
+    courses, watch, (plate,) = Courses(world, False, USUAL), StrayWatch(world, warned.append), world.observe().tools
     speed = world.scene.tool("plate").max_speed
     for distance in (1.1 * speed, 5.2 * speed, 9.0 * speed):
         target = ToolPose("plate", plate.position + [distance, 0.0, 0.0], plate.orientation)
         courses.take([target], pytest.fail)
-        watch.look(courses)
+        watch.look_at_delays(courses)
         assert bool(warned) == (distance > 1.2 * speed)
     (told,) = warned
     assert f"tool 'plate' is told to go where it gets 5.2 s later than asked at its max_speed of {speed:g} m/s" in told
