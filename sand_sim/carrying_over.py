@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from sand_sim.assemble import Assembly, build_solver
+from sand_sim.engine.state import set_back_half_a_step
 from sand_sim.grain_table import GrainTable
-from sand_sim.integrator import VERLET
 from sand_sim.mesh_roots import allowed_mesh, mesh_roots
 from sand_sim.tool_model import ToolModel, model_tool, with_mesh
 
@@ -55,9 +55,7 @@ def carry_over(old: Assembly, new: Assembly, replaced: int | None = None) -> Non
     newcomers = slice(grains, grains + added)
     state["grains.number"] = np.array(grains + added)
     state["grains.came_from"][newcomers] = np.arange(grains, grains + added)
-    if old.recipe.integrator == VERLET and not state["flags.starting"][0]:
-        half_step = 0.5 * old.time_step.value * np.asarray(old.scene.gravity)
-        state["grains.half_motion"][newcomers] -= half_step.astype(state["grains.half_motion"].dtype)
+    set_back_half_a_step(old.solver.arrays, state, "grains", newcomers)
     if "tool.partner" in state:
         numbers = _particle_numbers(old.solver.arrays.tools, new.solver.arrays.tools, replaced)
         state["tool.partner"] = numbers[state["tool.partner"]]

@@ -34,12 +34,15 @@ def settle(assembly: Assembly, doubts: tuple[str, ...], progress: Progress) -> l
         SceneError: if the bed blows up, all grains leave, or there is no room for a body that is thrown.
     """
     if assembly.scene.settle.time > 0.0:
-        thrown, start = _thrown(assembly), assembly.solver.take_state()
-        assembly.solver.remove(thrown)
-        told = _spent(assembly)
+        thrown, told = _thrown(assembly), _spent(assembly)
+        if len(thrown):
+            start = assembly.solver.take_state()
+            assembly.solver.remove(thrown)
         if len(thrown) < len(assembly.table):
             told += _come_to_rest(assembly, doubts, progress)
-        _throw(assembly, start, thrown)
+        if len(thrown):
+            _check_room(assembly, thrown)
+            revive(assembly.solver, start, thrown)
         left = assembly.table.grains - len(observe_grains(assembly))
         if left:
             told.append(
@@ -92,21 +95,19 @@ def _thrown(assembly: Assembly) -> np.ndarray:
     return np.flatnonzero(np.isin(assembly.grain_of_sphere, bodies))
 
 
-def _throw(assembly: Assembly, start: dict[str, np.ndarray], thrown: np.ndarray) -> None:
-    """Put bodies where they were, to fly from now on."""
-    if not len(thrown):
-        return
+def _check_room(assembly: Assembly, thrown: np.ndarray) -> None:
+    """See that bodies that are thrown, of whose spheres the identities are given, overlap nothing as they come in."""
     assembly.solver.measure()
     table, poses = assembly.table, [(tool.pose.position, tool.pose.orientation) for tool in assembly.scene.tools]
     there = find_obstacles(assembly, observe_spheres(assembly), poses, table.position[thrown], table.radius[thrown])
     there.pop("one another", None)
-    for name, which in there.items():
+    if there:
+        name, which = next(iter(there.items()))
         body = assembly.scene.bodies[assembly.grain_of_sphere[thrown[which[0]]] - sum(assembly.fill_numbers)]
         raise SceneError(
             f"bodies.{body.name}: is given a velocity or a spin, so it comes in when beds have settled, and overlaps {name} "
             "then; place it higher"
         )
-    revive(assembly.solver, start, thrown)
 
 
 def _spent(assembly: Assembly) -> list[str]:

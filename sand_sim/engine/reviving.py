@@ -4,7 +4,7 @@ import numpy as np
 
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.explicit_dem import ExplicitDem
-from sand_sim.integrator import VERLET
+from sand_sim.engine.state import set_back_half_a_step
 
 
 def revive(solver: ExplicitDem, start: dict[str, np.ndarray], identities: np.ndarray) -> None:
@@ -28,23 +28,18 @@ def revive(solver: ExplicitDem, start: dict[str, np.ndarray], identities: np.nda
             rows[here + 1] = rows[number]
     state["grains.number"] = np.array(number + len(here))
     state["grains.came_from"][here] = here
-    half_step = 0.5 * arrays.setting.dt * np.asarray(arrays.setting.gravity)
-    movers = {"grains": here}
+    set_back_half_a_step(arrays, state, "grains", here)
     if arrays.bodies:
-        movers["bodies"] = _revive_bodies(arrays, state, start, here)
-    if arrays.recipe.integrator == VERLET and not state["flags.starting"][0]:
-        for kind, rows in movers.items():
-            velocity = state[f"{kind}.half_motion"]
-            velocity[rows] -= half_step.astype(velocity.dtype)
+        _revive_bodies(arrays, state, start, here)
     solver.put_state(state)
     solver.expect_moves()
 
 
-def _revive_bodies(arrays: DemArrays, state: dict, start: dict, spheres: np.ndarray) -> np.ndarray:
-    """The bodies that spheres are of, as they were; their numbers."""
+def _revive_bodies(arrays: DemArrays, state: dict, start: dict, spheres: np.ndarray) -> None:
+    """Put back the bodies that spheres are of."""
     member = state["grains.member"][spheres]
     bodies = np.unique(arrays.bodies.body_of.numpy()[member[member >= 0]])
     for name, rows in state.items():
         if name.startswith("bodies.") and name != "bodies.sphere_at":  # which is found anew with the lists
             rows[bodies] = start[name][bodies]
-    return bodies
+    set_back_half_a_step(arrays, state, "bodies", bodies)

@@ -5,6 +5,7 @@ import warp as wp
 
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.count import Count
+from sand_sim.integrator import VERLET
 
 
 def take_state(arrays: DemArrays) -> dict[str, np.ndarray]:
@@ -48,6 +49,20 @@ def put_state(arrays: DemArrays, state: dict[str, np.ndarray]) -> bool:
         lanes.zero_()
         wp.copy(lanes, wp.array(state[name], dtype=lanes.dtype, device=arrays.device), count=1)
     return grown
+
+
+def set_back_half_a_step(arrays: DemArrays, state: dict[str, np.ndarray], kind: str, rows) -> None:
+    """Give newcomers, whose velocities are of now, those of half a step ago, where the integrator asks for them.
+
+    Args:
+        arrays: of the world.
+        state: of that world, in which they are.
+        kind: ``grains`` or ``bodies``.
+        rows: theirs.
+    """
+    if arrays.recipe.integrator == VERLET and not state["flags.starting"][0]:
+        velocity, setting = state[f"{kind}.half_motion"], arrays.setting
+        velocity[rows] -= (0.5 * setting.dt * np.asarray(setting.gravity)).astype(velocity.dtype)
 
 
 def _on_host(array: wp.array) -> np.ndarray:
