@@ -1,6 +1,7 @@
 """Whether a command makes sense by itself, and where a velocity leads."""
 
 from dataclasses import replace
+from numbers import Integral
 
 import numpy as np
 
@@ -32,6 +33,18 @@ def check_command(command: Command) -> Command:
         except ValueError as error:
             raise CommandError("zero_quaternion", f"{tool}: orientation is {error}") from None
     return replace(command, **values)
+
+
+def check_steps(steps: int) -> None:
+    """See that a world can take so many steps.
+
+    Raises:
+        CommandError: if the number is not whole, as that of seconds, or negative.
+    """
+    if not isinstance(steps, Integral):
+        raise CommandError("steps", f"must be a whole number, got {steps!r}; for t seconds give 'round(t / world.time_step)'")
+    if steps < 0:
+        raise CommandError("steps", f"a world is stepped forward, got {steps} steps; go back by 'restore'")
 
 
 def pose_after(velocity: ToolVelocity, position: np.ndarray, orientation: np.ndarray, duration: float) -> ToolPose:

@@ -9,7 +9,7 @@ from sand_sim.beforehand import find_coarseness, find_fine_surfaces, find_overla
 from sand_sim.border import CommandError, GrainContacts, Health, Observation, ToolContacts, ToolPose, ToolVelocity
 from sand_sim.carrying_over import describe_changes, expect_layout, fit
 from sand_sim.changing import Changeable
-from sand_sim.commands import Command, check_command, pose_after
+from sand_sim.commands import Command, check_command, check_steps, pose_after
 from sand_sim.contact_reading import observe_grain_contacts, observe_tool_contacts
 from sand_sim.engine.explicit_dem import ExplicitDem, UnstableError
 from sand_sim.engine.state_check import check_layout, check_numbers
@@ -174,11 +174,10 @@ class World(Changeable):
         Once a frame, and whenever it is observed, the state is kept if energy is in order.
 
         Raises:
-            CommandError: if the number is negative.
+            CommandError: as ``check_steps``.
             UnstableError: if the run has blown up; the world is then back in the last good state that was kept.
         """
-        if steps < 0:
-            raise CommandError("steps", f"a world is stepped forward, got {steps} steps; go back by 'restore'")
+        check_steps(steps)
         if self._measured and self._measured[0] == self._solver.steps_done:
             self._keep()
         every = max(self.frame_steps, _FEWEST_BETWEEN)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scenes import write_small_scene
 
-from sand_sim import CommandError, ToolPose, World, load_scene
+from sand_sim import CommandError, SceneError, ToolPose, World, load_scene
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,26 @@ def test_poses_of_another_shape_are_refused(world, position, orientation, told):
         world.apply(ToolPose("plate", np.array(position), np.array(orientation)))
 
 
-def test_a_part_of_a_step_is_refused(world):
-    with pytest.raises(TypeError, match="'float' object cannot be interpreted as an integer"):
-        world.step(2.5)
+@pytest.mark.parametrize(
+    ("steps", "told"),
+    [
+        (2.5, r"must be a whole number, got 2.5; for t seconds give 'round\(t / world.time_step\)'"),
+        (-1, "a world is stepped forward, got -1 steps; go back by 'restore'"),
+    ],
+)
+def test_a_part_of_a_step_and_steps_back_are_refused(world, steps, told):
+    with pytest.raises(CommandError, match=told):
+        world.step(steps)
     assert world.steps == 0
+
+
+def test_numbers_of_steps_may_come_from_numpy(world):
+    begin = world.save()
+    world.step(np.int64(2))
+    assert world.steps == 2
+    world.restore(begin)
+
+
+def test_the_name_of_a_file_is_no_scene():
+    with pytest.raises(SceneError, match=r"scene: must be a Scene, got 'dig.yaml'; 'load_scene\(path\)' reads one"):
+        World("dig.yaml")

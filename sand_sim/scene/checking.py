@@ -13,6 +13,10 @@ def check_scene(scene: Scene) -> None:
     Raises:
         SceneError: naming the field and how to mend it.
     """
+    if not isinstance(scene, Scene):
+        raise SceneError(
+            f"scene: must be a Scene, got {scene!r:.60}; 'load_scene(path)' reads one from a file, 'read_scene' from a mapping"
+        )
     if not scene.materials:
         raise SceneError("materials: at least one material is needed")
     if not (scene.fills or scene.bodies):

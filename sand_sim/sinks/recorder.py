@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from sand_sim.border import Observation
+from sand_sim.sinks.origin import find_origin
 from sand_sim.sinks.run_log import RunLog
 from sand_sim.world import World
 
@@ -108,7 +109,7 @@ class Recorder:
         if self._output is None or self.log.last is None:
             return files
         begin = self._output / self._world.scene.name
-        for ending, write in ((".npz", self.log.save_history), (".json", self.log.save_summary), (".png", self._draw)):
+        for ending, write in ((".npz", self.log.save_history), (".json", self._save_summary), (".png", self._draw)):
             path = begin.with_name(begin.name + ending)
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -122,6 +123,9 @@ class Recorder:
                 with contextlib.suppress(OSError):
                     path.unlink(missing_ok=True)  # half a file is worse than none
         return files
+
+    def _save_summary(self, path: Path) -> None:
+        self.log.save_summary(path, find_origin(self._world))
 
     def _draw(self, path: Path) -> None:
         from sand_sim.sinks.figure import draw_run

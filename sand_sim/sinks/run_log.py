@@ -183,9 +183,9 @@ class RunLog:
         grains = {f"bed.{key}": value for key, value in asdict(self.last.grains).items()}
         np.savez_compressed(path, **self.columns(), **grains)
 
-    def save_summary(self, path: Path) -> None:
-        """Write the summary to a JSON file."""
-        path.write_text(json.dumps(self.summarise(), indent=2) + "\n")
+    def save_summary(self, path: Path, origin: dict) -> None:
+        """Write the summary to a JSON file, with what the run was made from and with."""
+        path.write_text(json.dumps(self.summarise() | origin, indent=2) + "\n")
 
 
 def _summarise_tool(columns: dict[str, np.ndarray], tool: Tool) -> dict:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.metadata import version
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -62,6 +63,12 @@ def test_run_writes_everything_and_sums_up(tmp_path):
     assert summary["tools"]["plate"]["peak_draft_N"] >= 0.0
     assert {"carried_kg", "spilled_kg"} <= set(summary["tools"]["plate"])
     assert summary["doubts"] == []
+    assert summary["scene"]["tools"]["plate"]["mesh"].startswith("sha256 ")  # where variants of a scene differ
+    written = yaml.safe_load(scene.read_text())["materials"]
+    assert {name: found["density"] for name, found in summary["scene"]["materials"].items()} == {
+        name: given["density"] for name, given in written.items()
+    }
+    assert summary["versions"]["warp-lang"] == version("warp-lang")
     for kind in ("rrd", "npz", "png"):
         assert (tmp_path / "results" / f"small.{kind}").stat().st_size > 1000
     for word in ("real-time factor", "peak draft", "energy balance", "energy from nowhere", "largest overlap / radius"):
