@@ -11,7 +11,7 @@ from sampler.rays import closing_cones, count_windings, leavings_between
 
 ASIDE = wp.constant(1.0e-5)  # of the diagonal: how much nearer the wrong side of a wall must be to be taken
 _APART = 2.0, 1.2  # times their spread, from where on triangles are summed: within 0.002, and within 0.07 in a third of the time
-_SURE = 0.25  # how near to a whole number such a rough winding number is good enough
+_SURE = 0.38  # how near to a whole number rough winding numbers are good enough: asked is on which side of a half they are
 _FARTHEST = 4.0  # of the diagonal: as far as rays go
 _RAGGED = 0.5  # open edges per triangle from which solid angles are as fast
 
