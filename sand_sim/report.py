@@ -7,8 +7,8 @@ def progress_line(log: RunLog) -> str:
     """One line on where a run is."""
     row = log.rows[-1]
     parts = [
-        f"t {row['time']:6.2f} s",
-        f"wall {row['wall']:6.1f} s",
+        f"t {_seconds(row['time']):>6} s",
+        f"wall {_seconds(row['wall'], 1):>6} s",
         f"real-time factor {log.real_time_factor:.3f}",
         f"{row['contacts']:,} contacts",
     ]
@@ -16,6 +16,11 @@ def progress_line(log: RunLog) -> str:
         x, y, z = row[f"{tool.name}.force"]
         parts.append(f"{tool.name} ({x:.1f}, {y:.1f}, {z:.1f}) N, {row[f'{tool.name}.carried']:.2f} kg")
     return "  ".join(parts)
+
+
+def _seconds(time: float, places: int = 2) -> str:
+    """With so many decimal places, and three digits of less than a second: an impact lasts microseconds."""
+    return f"{time:.{places}f}" if time >= 1.0 else f"{time:.3g}"
 
 
 def summary_text(summary: dict) -> str:
@@ -29,7 +34,8 @@ def summary_text(summary: dict) -> str:
         ("steps", f"{summary['steps']:,} of {summary['time_step_s'] * 1e6:.3g} us"),
         (
             "simulated",
-            f"{summary['simulated_s']:.2f} s in {summary['wall_s']:.1f} s, real-time factor {summary['real_time_factor']:.3f}",
+            f"{_seconds(summary['simulated_s'])} s in {_seconds(summary['wall_s'], 1)} s"
+            f", real-time factor {summary['real_time_factor']:.3f}",
         ),
         ("contacts", f"{summary['contacts']:,}"),
         ("largest overlap / radius", f"{summary['largest_overlap_over_radius']:.4f}"),

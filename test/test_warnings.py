@@ -23,6 +23,7 @@ LIQUID = {"bridge_volume": 0.01}
             {"numbers": {"rolling_friction": 0.1}},
             ["pairs: 'rolling_friction' has no effect; .* would have to say rolling: constant, or rolling: spring$"],
         ),
+        ({"numbers": {"rolling_friction": 0.0}}, []),  # as much as says that there is none
         ({"friction": 4.0, "material": {"density": 12.0, "young": 1e7, "poisson": 0.25}}, []),
         (
             {"friction": 35.0},

@@ -86,9 +86,9 @@ def odd_numbers(scene: Scene) -> list[str]:
 
 
 def unused_numbers(scene: Scene) -> list[str]:
-    """What the scene gives for the sake of contact laws that it has not chosen, for whoever forgot to choose them."""
+    """What the scene gives for the sake of contact laws that it has not chosen, for whoever forgot to choose them; but zeros."""
     told, chosen = [], set(scene.contact.asks)
-    for name in dict.fromkeys(name for rule in scene.pairs for name in rule.numbers):
+    for name in dict.fromkeys(name for rule in scene.pairs for name, number in rule.numbers.items() if number):
         if name not in chosen:
             ways = [f"{slot}: {law}" for slot, laws in SLOTS.items() for law in laws if name in laws[law].asks]
             told.append(f"pairs: '{name}' has no effect; the section 'contact' would have to say {', or '.join(ways)}")

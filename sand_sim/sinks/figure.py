@@ -40,7 +40,7 @@ def draw_run(log: RunLog, tools: list[ToolModel], path: Path) -> None:
     for axis, (name, view) in zip(axes, views, strict=True):
         axis.set_xlim(low[0], high[0])
         axis.set_ylim(low[1], high[1])
-        axis.set_title(f"{name}, t = {view.time:.2f} s", fontsize=9, loc="left")
+        axis.set_title(f"{name}, t = {view.time:.3g} s", fontsize=9, loc="left")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=130)
     plt.close(figure)
@@ -71,6 +71,7 @@ def _draw_curves(figure, columns: dict[str, np.ndarray], log: RunLog) -> None:
     for row in rows:
         row.grid(alpha=0.3)
         row.margins(x=0.01)
+        row.locator_params(axis="x", nbins=6)
 
 
 def _project(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -114,7 +115,8 @@ def _draw_view(axis, view: View, tools: list[ToolModel]) -> None:
             axis.add_collection(PolyCollection(outlines, facecolors=colour, edgecolors=colour, linewidths=0.4))
         start = end
     if items:
-        corners = np.concatenate([spots, *(polygon for _, polygon in faces)])
+        radius = view.radius[shown, None]
+        corners = np.concatenate([spots - radius, spots + radius, *(polygon for _, polygon in faces)])
         low, high = corners.min(axis=0), corners.max(axis=0)
         pad = 0.03 * float(np.max(high - low))
         axis.set_xlim(low[0] - pad, high[0] + pad)

@@ -12,7 +12,7 @@ def find_origin(world: World) -> dict:
     """The scene's physics in plain values, files by their digests, beside device and versions."""
     return {
         "scene": world.identity,
-        "device": world.scene.solver.device,
+        "device": world.assembly.solver.device.label,
         "machine": platform.machine(),
         "versions": {name: _version_of(name) for name in _PACKAGES} | {"python": platform.python_version()},
     }

@@ -75,6 +75,14 @@ def test_run_writes_everything_and_sums_up(tmp_path):
         assert word in output
 
 
+def test_one_impact_of_milliseconds_is_told_as_it_is(tmp_path):
+    """A picture of one sphere has no extent but its own; what a scene says is absent needs no warning."""
+    code, output, errors = finish(sand_sim(tmp_path, "run", "impact", "--out", "results"))
+    assert code == 0, errors
+    assert "simulated                 0.002 s in" in output
+    assert "warning" not in errors.lower()
+
+
 @pytest.mark.parametrize("buffered", ["", "1"])
 @pytest.mark.parametrize("words", ["sand_sim --help", "sand_sim bench --list", "sand_sim plan impact --json", "sand_sim.node -h"])
 def test_output_that_nobody_reads_is_no_error(tmp_path, words, buffered):
