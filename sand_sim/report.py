@@ -19,8 +19,8 @@ def progress_line(log: RunLog) -> str:
 
 
 def _seconds(time: float, places: int = 2) -> str:
-    """With so many decimal places, and three digits of less than a second: an impact lasts microseconds."""
-    return f"{time:.{places}f}" if time >= 1.0 else f"{time:.3g}"
+    """With so many decimal places, and three digits of less than a tenth: an impact lasts microseconds."""
+    return f"{time:.{places}f}" if time >= 0.1 else f"{time:.3g}"
 
 
 def summary_text(summary: dict) -> str:
