@@ -15,6 +15,7 @@ from sampler.skin import Skin
 _WATCHED = 0.15  # places that were found so near to being a gap are looked at the next time, too, in spacings
 _PORTION = 500_000  # random places that are thrown at a time
 _STEPS = 8, 4  # from the worst places known to the worst ones near by, and trials for each
+CLOSE_STEPS = 16, 8  # those of who wants to be sure
 _GAP = 0.785, 0.965  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
 _GRAVE, _WEIGHT = (0.785, 0.99), 4.0  # and from these ways on a grave one; that, and loneliness, counts so much more
 _GAPS_APART = 1.2  # gaps nearer than this to a deeper one wait, in spacings
@@ -132,10 +133,13 @@ class Gaps:
         new = Places(points, normals, *found, np.full(len(points), fixed), cell_numbers(self._grid, points))
         return new if fixed else new.at(new.excess > -_WATCHED)
 
-    def judge(self, pinned: np.ndarray, random: np.random.Generator) -> Verdict:
-        """Say what is wrong; of particles too near to others those that are not pinned, shape (n,), are to blame."""
+    def judge(self, pinned: np.ndarray, random: np.random.Generator, closely: bool = False) -> Verdict:
+        """Say what is wrong, as closely as it is measured in the end if so asked.
+
+        Of particles too near to others those that are not pinned, shape (n,), are to blame.
+        """
         nearest = self.neighbour_distances()
-        self._seek(random)
+        self._seek(random, CLOSE_STEPS if closely else _STEPS)
         places, free, excess = self.places, self.places.closest["way"], self.places.excess
         for i, beside in self._places_beside(np.flatnonzero(nearest > _LONELY)):
             k = beside[free[beside].argmax()]
@@ -172,9 +176,9 @@ class Gaps:
         known = self.places.points, self.places.normals, found["which"], found["way"]
         return climb(self.skin, self.cells, known, along, steps, self._unit, most, random)
 
-    def _seek(self, random: np.random.Generator) -> None:
+    def _seek(self, random: np.random.Generator, steps: tuple[int, int]) -> None:
         """Look at the worst places near the worst ones known, too."""
-        worst = [self.climb(along, _STEPS, random)[:2] for along in (False, True)]
+        worst = [self.climb(along, steps, random)[:2] for along in (False, True)]
         self.places = self.places.joined(self._looked_at(*map(np.concatenate, zip(*worst, strict=True)), fixed=False))
 
     def _places_beside(self, which: np.ndarray):

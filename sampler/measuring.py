@@ -3,14 +3,13 @@
 import numpy as np
 
 from sampler.body import Evenness
-from sampler.gaps import FAR, Gaps
+from sampler.gaps import CLOSE_STEPS, FAR, Gaps
 from sampler.lattice import lattice_spacing
 from sampler.skin import Skin
 
 _MEASURED = 50  # places per particle, over the area, and as many over the edges
 _MANY = 10_000  # of so many particles, only places that may be among the worst are kept in mind
 _SURVEYED = 5000  # of the places that have none near, so many are asked where it is
-_STEPS = 16, 8  # from the worst of them to the worst ones near by, and trials for each
 
 
 def measure_evenness(skin: Skin, points: np.ndarray, normals: np.ndarray) -> Evenness:
@@ -35,5 +34,5 @@ def _worst_place(gaps: Gaps, along: bool, most: float, random: np.random.Generat
     far = np.flatnonzero(found["way"] >= FAR)
     far = far[:: 1 + len(far) // _SURVEYED]
     found[far] = gaps.measure(gaps.places.points[far], gaps.places.normals[far], most)[along]
-    worst = gaps.climb(along, _STEPS, random, most)[2].max()
+    worst = gaps.climb(along, CLOSE_STEPS, random, most)[2].max()
     return worst if worst < most else np.inf

@@ -76,7 +76,7 @@ def spread_particles(
         verdict = gaps.judge(state.pinned, random)
         if looks < _LOOKS and verdict.fault < (_FINE if looks else _HARDLY):  # a gap on a small piece may have had no place
             gaps.scatter(_CONFIRMED * number, random)
-            verdict = gaps.judge(state.pinned, random)
+            verdict = gaps.judge(state.pinned, random, closely=True)
             looks, least = looks + 1, np.inf  # what was found before had not been looked at so closely
         stuck = 0 if verdict.fault < least else stuck + 1
         if verdict.fault < least:
