@@ -197,8 +197,9 @@ class Simulation:
         with self._wake:
             if self._stopping:
                 future.cancel()
-            self._requests.append((act, future))
-            self._wake.notify_all()
+            else:
+                self._requests.append((act, future))
+                self._wake.notify_all()
         return future
 
     def _run(self) -> None:
@@ -221,31 +222,31 @@ class Simulation:
         finally:
             with self._wake:
                 self._stopping = True
-                for _, future in self._requests:
-                    future.cancel()
+                while self._requests:
+                    self._requests.popleft()[1].cancel()
             self._keep_last()
 
     def _take_in(self) -> None:
         """Carry out what has come in from other threads."""
         with self._wake:
-            commands, requests = list(self._inbox), list(self._requests)
+            commands, requests = list(self._inbox), len(self._requests)
             self._inbox.clear()
-            self._requests.clear()
         if self.fault is None:
             with np.errstate(over="ignore", invalid="ignore"):  # what comes of huge numbers is refused
                 self.courses.take(commands, self.reject)
         else:
             for command in commands:
                 self.reject(CommandError("stopped", f"tool '{command.tool}': stepping has stopped, reset to go on"))
-        for act, future in requests:
+        for _ in range(requests):
+            act, future = self._requests.popleft()  # one by one: those left where one ends the stepping are cancelled
+            if not future.set_running_or_notify_cancel():  # nobody waits for it any more
+                continue
             try:
                 future.set_result(act())
-            except UnstableError as error:
-                self._fail(error)
-                future.set_exception(error)
             except (CommandError, CheckpointError) as error:
                 future.set_exception(error)
             except Exception as error:
+                self._fail(error)  # first, so that whoever waits finds the fault
                 future.set_exception(error)
                 raise
 
@@ -300,8 +301,7 @@ class Simulation:
         self._on_frame(self.world.observe())
 
     def _checkpoint(self) -> Checkpoint:
-        told = pack_told(self.courses, self.rejected, self._frame_end)
-        return take_checkpoint(self.world, told, self._pack_history())
+        return take_checkpoint(self.world, pack_told(self.courses, self.rejected, self._frame_end), self._pack_history())
 
     def _load(self, path: Path) -> float:
         self._writer.submit(bool).result()  # a state that is still being written may be the one that is asked for

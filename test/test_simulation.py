@@ -2,6 +2,7 @@
 
 import threading
 import time
+from concurrent.futures import CancelledError
 
 import numpy as np
 import pytest
@@ -214,3 +215,29 @@ def test_stop_comes_soon_whatever_it_does(scene):
         begin = time.monotonic()
     assert time.monotonic() - begin < 5.0
     assert not running.simulation._thread.is_alive()
+
+
+def test_a_request_that_nobody_waits_for_any_more_is_left_out(scene):
+    with Running(scene, "lockstep") as running:
+        simulation, held, done = running.simulation, threading.Event(), []
+        first = simulation.request(lambda: held.wait(30.0))
+        given_up, last = simulation.request(lambda: done.append("given up")), simulation.request(lambda: done.append("last"))
+        assert given_up.cancel()
+        held.set()
+        assert first.result(30.0)
+        last.result(30.0)
+    assert done == ["last"]
+
+
+def test_whoever_waits_is_answered_when_an_error_ends_the_stepping(scene):
+    running = Running(scene, "lockstep")
+    simulation = running.simulation
+    broken, next_one = simulation.request(lambda: 1 / 0), simulation.step()  # taken in together
+    simulation.start()
+    with pytest.raises(ZeroDivisionError):
+        broken.result(30.0)
+    with pytest.raises(CancelledError):
+        next_one.result(30.0)
+    assert running.faults == [simulation.fault]
+    assert simulation.step().cancelled()
+    simulation.stop()
