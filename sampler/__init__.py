@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from sampler.distance import SignedDistance
     from sampler.errors import MeshError
     from sampler.field import DistanceField, make_field
-    from sampler.location import locate_mesh, package_prefixes, package_share
+    from sampler.location import locate_mesh, package_prefixes, package_share, split_address
     from sampler.reading import read_mesh
     from sampler.repair import repair_mesh
     from sampler.sampling import sample_body
@@ -31,6 +31,7 @@ __all__ = [
     "sample_file",
     "sample_mesh",
     "save_body",
+    "split_address",
 ]
 
 _HOMES = {
@@ -49,6 +50,7 @@ _HOMES = {
     "sample_file": "cache",
     "sample_mesh": "cache",
     "save_body": "storage",
+    "split_address": "location",
 }
 
 

@@ -23,25 +23,43 @@ def locate_mesh(address: str, folder: Path | None = None, kind: str = "mesh") ->
         The path of an existing file.
 
     Raises:
-        MeshError: if there is no such package or file, or the scheme is unknown.
+        MeshError: if there is no such package or file, or as ``split_address``.
     """
-    parts = urlparse(address)
-    if parts.scheme == "package":
-        try:
-            share = package_share(parts.netloc)
-        except MeshError as error:
-            raise MeshError(f"{kind} '{address}': {error}") from None
-        path = share / unquote(parts.path).lstrip("/")
-    elif parts.scheme == "file":
-        path = Path(unquote(parts.path))
-    elif parts.scheme == "" or len(parts.scheme) == 1:
-        path = Path(expanduser(address))
-        path = path if path.is_absolute() else (folder or Path.cwd()) / path
-    else:
-        raise MeshError(f"{kind} '{address}': unknown scheme '{parts.scheme}://'; use package://, file:// or a path")
-    if not path.is_file():
+    try:
+        package, name = split_address(address)
+        if package is None:
+            path = (folder or Path.cwd()) / expanduser(name)  # an absolute path replaces the folder
+        else:
+            path = package_share(package) / name
+        there = path.is_file()
+    except OSError as error:
+        raise MeshError(f"{kind} '{address}': {error.strerror}") from None
+    except MeshError as error:
+        raise MeshError(f"{kind} '{address}': {error}") from None
+    if not there:
         raise MeshError(f"{kind} '{address}': there is no file {path}")
     return path
+
+
+def split_address(address: str) -> tuple[str | None, str]:
+    """The ROS package that an address names, None for none, and the path, within the package if there is one.
+
+    Raises:
+        MeshError: if it is none, is of another machine, or its scheme is unknown.
+    """
+    try:
+        parts = urlparse(address)
+    except ValueError as error:  # of brackets, which are for numbers of machines
+        raise MeshError(f"is no address: {error}") from None
+    if parts.scheme == "package":
+        return parts.netloc, unquote(parts.path).lstrip("/")
+    if parts.scheme == "file":
+        if parts.netloc not in ("", "localhost"):
+            raise MeshError("lies on another machine; an address of a file begins with file:///")
+        return None, unquote(parts.path)
+    if len(parts.scheme) > 1:  # one letter is a drive
+        raise MeshError(f"unknown scheme '{parts.scheme}://'; use package://, file:// or a path")
+    return None, address
 
 
 def package_prefixes() -> list[Path]:

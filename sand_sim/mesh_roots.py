@@ -4,9 +4,9 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from os.path import expanduser  # unlike that of Path it leaves a home that nobody knows as it is
 from pathlib import Path
-from urllib.parse import unquote, urlparse
+from urllib.parse import unquote
 
-from sampler import MeshError, package_prefixes, package_share
+from sampler import MeshError, package_prefixes, package_share, split_address
 from sand_sim.config_folder import config_folder
 from sand_sim.scene.types import SceneError
 from sand_sim.showing import shown
@@ -83,24 +83,17 @@ def _places(uri: str, roots: Sequence[Path]) -> tuple[list[Path], str]:
     """Where a file may lie, and the package that its address names, if any."""
     if not uri or len(uri) > _LONGEST or not unquote(uri).isprintable():
         raise ValueError("is empty, too long, or holds letters that cannot be printed")
-    parts = urlparse(uri)
-    path = unquote(parts.path)
-    if parts.scheme == "package":
-        return [package_share(parts.netloc) / path.lstrip("/")], parts.netloc
-    if parts.scheme == "file":
-        if parts.netloc not in ("", "localhost"):
-            raise ValueError("lies on another machine; an address of a file begins with file:///")
-        return [Path(path)], ""
-    if parts.scheme:
-        raise ValueError(f"unknown scheme '{parts.scheme}://'; use package://, file:// or a path")
-    return [root / uri for root in roots], ""  # an absolute path replaces the root
+    package, path = split_address(uri)
+    if package is None:
+        return list(dict.fromkeys(root / path for root in roots)), ""  # an absolute path replaces the root
+    return [package_share(package) / path], package
 
 
 def _package_around(place: Path) -> str:
     """The ROS package in whose share folder a path is, as it is written; empty if in none."""
     for prefix in package_prefixes():
         share = prefix / "share"
-        if place.is_relative_to(share) and (share / (name := place.relative_to(share).parts[0]) / "package.xml").is_file():
+        if share in place.parents and (share / (name := place.relative_to(share).parts[0]) / "package.xml").is_file():
             return name
     return ""
 

@@ -84,6 +84,7 @@ OUTSIDE = "lies outside the folders that meshes may come from"
         ("package://digger/meshes/x.stl", OUTSIDE),
         ("file://{}/install/share/digger/../../../outside/secret.stl", OUTSIDE),
         ("file://{}/install/share/../../outside/secret.stl", OUTSIDE),
+        ("file://{}/install/share", OUTSIDE),
         ("~/secret.stl", "there is no file"),
         ("missing.stl", "there is no file"),
         ("meshes", "there is no file"),
@@ -169,3 +170,8 @@ def test_a_refusal_names_each_folder_once_and_where_to_put_the_file(tmp_path):
         allowed_mesh("/etc/passwd", [tmp_path, tmp_path], True)
     assert str(caught.value).count(str(tmp_path)) == 1
     assert "put it there, use package://, or name its folder in the parameter mesh_roots" in str(caught.value)
+
+
+def test_a_file_that_is_missing_is_named_once(tmp_path):
+    with pytest.raises(SceneError, match=rf"there is no file {tmp_path}/none\.stl$"):
+        allowed_mesh(f"{tmp_path}/none.stl", [tmp_path, tmp_path / "meshes"], False)

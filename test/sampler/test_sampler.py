@@ -78,6 +78,9 @@ def test_meshes_are_found_by_address(tmp_path, monkeypatch):
         ("https://example.org/mesh.stl", "unknown scheme 'https://'"),
         ("missing.stl", "there is no file"),
         ("file:///missing.stl", "there is no file"),
+        ("file://meshes/missing.stl", "lies on another machine; an address of a file begins with file:///"),
+        ("//[bracket.stl", "is no address"),
+        ("x" * 5000, "File name too long"),
     ],
 )
 def test_addresses_that_lead_nowhere_are_refused(address, reason):
