@@ -66,7 +66,7 @@ def load_scene(path: str | Path) -> Scene:
         parsed = yaml.load(path.read_text(encoding="utf-8"), _Loader)
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, ValueError, AttributeError, RecursionError) as error:  # of dates, long numbers, deep nests, too
         told = " ".join(str(error).split()).replace('in "<unicode string>", ', "in ")  # the file is named before it
         raise SceneError(f"{path}: is not valid YAML: {told}") from None
     try:

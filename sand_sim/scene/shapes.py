@@ -146,7 +146,7 @@ def read_shape(path: Path) -> Shape:
             f"shape: '{path.name}' is neither {SPHERE} nor {TETRAHEDRON}, and cannot be read as a file of spheres: "
             f"{error.strerror or error}"
         ) from None
-    except (KeyError, ValueError, TypeError, AttributeError) as error:
+    except (KeyError, ValueError, TypeError, AttributeError, csv.Error) as error:
         raise SceneError(f"shape: file '{path.name}' needs the columns x, y, z, radius in numbers: {error}") from None
     if not len(radii) or centres.shape != (len(radii), 3):
         raise SceneError(f"shape: file '{path.name}' holds no spheres; give one row x, y, z, radius for each")

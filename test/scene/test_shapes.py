@@ -83,6 +83,7 @@ def test_a_clump_file_that_has_changed_is_read_again(tmp_path):
         ("x,y,z,radius\n0,0,0,-1\n", "not positive"),
         ("x,y,z,radius\n0,nan,0,1\n", "not finite"),
         ("x,y,z,radius\n0,zero,0,1\n", "numbers"),
+        (f"x,y,z,radius\n0,{'0' * 200_000},0,1\n", "numbers"),
     ],
 )
 def test_bad_clump_files_are_refused(tmp_path, text, named):
