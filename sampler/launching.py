@@ -1,6 +1,5 @@
 """Launching a kernel on all cores."""
 
-import os
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
 from itertools import pairwise
@@ -8,12 +7,14 @@ from itertools import pairwise
 import numpy as np
 import warp as wp
 
+from sampler.cores import available_cores
+
 _TOGETHER = 2000  # items below which a second core is not worth its start
 
 
 def launch_shares(kernel, number: int, inputs: list, outputs: list, device: str) -> None:
     """Launch a kernel whose argument before the outputs is its first item; on a CPU each core takes a share of the items."""
-    cores = len(os.sched_getaffinity(0)) if str(device) == "cpu" and number >= _TOGETHER else 1
+    cores = available_cores() if str(device) == "cpu" and number >= _TOGETHER else 1
 
     def run(first, last):
         wp.launch(kernel, dim=int(last - first), inputs=[*inputs, int(first), *outputs], device=device)

@@ -5,12 +5,12 @@ from functools import cached_property
 
 import numpy as np
 
+from sampler.cores import available_cores
 from sand_sim.body_model import BodyModel, lighten, model_body
 from sand_sim.domain import make_lattice
 from sand_sim.engine.arrays import DemArrays, Setting
 from sand_sim.engine.device import open_device
 from sand_sim.engine.explicit_dem import ExplicitDem
-from sand_sim.engine.lanes import available_cores
 from sand_sim.engine.lattice import Lattice
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.tool_body import ToolBody

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scenes import floor, write_small_scene
 
+from sampler.cores import available_cores
 from sand_sim import CommandError, SceneError, World, load_scene
 from sand_sim.border import ToolVelocity
 from sand_sim.cli.main import main
-from sand_sim.engine.lanes import available_cores
 
 LIQUID = {"bridge_volume": 0.01}
 
@@ -127,12 +127,3 @@ def test_more_threads_than_cores_are_told_and_not_all_started(make_world):
     assert world.assembly.solver.device.lanes == 2 * cores
     assert world.warnings == [f"solver.threads: 1000 on {cores} cores wait for one another; ask for at most {cores}"]
     assert make_world([[0.0, 0.0, 0.0]], 0.005, threads=1).warnings == []
-
-
-@pytest.mark.parametrize(("quota", "cores"), [("max 100000", 4), ("250000 100000", 2), ("20000 100000", 1), (None, 4), ("", 4)])
-def test_a_container_has_the_cores_that_its_share_is_worth(tmp_path, monkeypatch, quota, cores):
-    if quota is not None:
-        (tmp_path / "cpu.max").write_text(quota)
-    monkeypatch.setattr("sand_sim.engine.lanes._QUOTA", tmp_path / "cpu.max")
-    monkeypatch.setattr("os.sched_getaffinity", lambda process: range(4))
-    assert available_cores() == cores

@@ -10,9 +10,9 @@ import json
 import sys
 from pathlib import Path
 
+from sampler.cores import available_cores
 from sand_sim.cli.console import Console
 from sand_sim.cli.writing import check_file
-from sand_sim.engine.lanes import available_cores
 from sand_sim.interruption import InterruptedByUserError, Interruption
 from sand_sim.scene.types import SceneError
 

@@ -13,10 +13,11 @@ from collections.abc import Callable
 
 import warp as wp
 
+from sampler.cores import available_cores
 from sand_sim.engine.compiling import compile_kernels
 from sand_sim.engine.count import Count
 from sand_sim.engine.kernel import fill_gaps
-from sand_sim.engine.lanes import RECORDING, available_cores
+from sand_sim.engine.lanes import RECORDING
 
 _SHARES = 4096  # sums over all shares are serial, walks through one share too; for a million items this balances them
 _BLOCK = 128  # threads; contact kernels need many registers

@@ -6,14 +6,13 @@ stage. Every item is computed by the same code in the same order whatever the nu
 """
 
 import ctypes
-import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from pathlib import Path
 
 import warp as wp
 
+from sampler.cores import available_cores
 from sand_sim.engine.compiling import compile_kernels
 from sand_sim.engine.count import Count
 from sand_sim.engine.kernel import fill_gaps, kernel
@@ -50,23 +49,10 @@ _BARRIER = """
 def _meet(meeting: wp.array(dtype=int), lanes: int, patience: int, give_way: wp.uint64): ...
 
 
-_QUOTA = Path("/sys/fs/cgroup/cpu.max")  # of the group of processes: microseconds it may use of so many, on all cores together
-
-
 @kernel
 def meet(meeting: wp.array(dtype=int), lanes: int, patience: int, give_way: wp.uint64):
     """Wait until all lanes have come here; spin for a while, then give the core to others."""
     _meet(meeting, lanes, patience, give_way)
-
-
-def available_cores() -> int:
-    """Cores this process may use; of a container that may use a share of the machine, as many as that share is worth."""
-    cores = len(os.sched_getaffinity(0))
-    try:
-        quota, period = _QUOTA.read_text().split()
-        return min(cores, max(1, round(int(quota) / int(period))))
-    except (OSError, ValueError):  # none, or "max"
-        return cores
 
 
 class LaneRecorder:
