@@ -1,7 +1,6 @@
 """Ctrl-C and SIGTERM as a wish that long work looks at, instead of an exception at any moment."""
 
 import signal
-import threading
 
 
 class InterruptedByUserError(Exception):
@@ -15,14 +14,14 @@ class Interruption:
     """
 
     def __init__(self):
-        self._asked = threading.Event()
+        self._asked = False  # no event: a signal may come while one before it is handled, and would wait for its lock for ever
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._ask)
 
     @property
     def asked(self) -> bool:
         """Whether the user wants to stop."""
-        return self._asked.is_set()
+        return self._asked
 
     def check(self) -> None:
         """Raise ``InterruptedByUserError`` if the user wants to stop."""
@@ -33,4 +32,4 @@ class Interruption:
         if self.asked:
             signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)
-        self._asked.set()
+        self._asked = True
