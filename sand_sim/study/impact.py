@@ -89,6 +89,8 @@ def _bodies(world: World) -> tuple[float, float, float, float]:
     """Effective radius [m], mass [kg] and modulus [Pa] of the two bodies, and their restitution [1], NaN if laws ask for none."""
     scene, grains = world.scene, world.observe().grains
     planes = [wall for wall in world.assembly.walls if wall.kind == "plane"]
+    if len(world.assembly.table.bodies):
+        raise SceneError("the closed form of an impact is that of spheres, not of clumps or bodies; choose another --quantity")
     owners = [fill.material for fill, number in zip(scene.fills, world.assembly.fill_numbers, strict=True) for _ in range(number)]
     if len(grains) == 2:
         first, second = owners

@@ -7,6 +7,14 @@ from typing import Any
 
 import yaml
 
+# Entries that may be paths, by the sections they are in.
+_PATHS = {
+    "fills": ("file", "shape"),
+    "boundaries": ("mesh", "heights"),
+    "tools": ("mesh", "urdf"),
+    "bodies": ("mesh", "spheres"),
+}
+
 
 def write_scene(source: Path, edited: dict, path: Path) -> bool:
     """Write a scene file with changed entries.
@@ -46,10 +54,13 @@ def change_text(text: str, edited: dict) -> str:
 def _moved(parsed: dict, old: Path, new: Path) -> dict:
     """The scene with its relative paths starting at another folder."""
     moved = deepcopy(parsed)
-    for key, entries in (*((key, moved.get("tools", {}).values()) for key in ("mesh", "urdf")), ("file", moved["fills"])):
-        for entry in entries:
-            if key in entry and (old / entry[key]).is_file() and not Path(entry[key]).is_absolute():
-                entry[key] = os.path.relpath((old / entry[key]).resolve(), new.resolve())
+    for section, keys in _PATHS.items():
+        entries = moved.get(section) or ()
+        for entry in entries.values() if isinstance(entries, dict) else entries:
+            for key in keys:
+                path = entry.get(key)
+                if isinstance(path, str) and (old / path).is_file() and not Path(path).is_absolute():
+                    entry[key] = os.path.relpath((old / path).resolve(), new.resolve())
     return moved
 
 

@@ -144,17 +144,18 @@ def dampers(factor: float) -> Change:
 def repeated(parsed: dict, repeat: int, facts: Facts) -> dict:
     """A scene that differs from ``parsed`` by chance only, to see how much chance does; repeat zero is the scene itself.
 
-    Fills take other seeds. Where grains come from a file, planes are moved back by up to a thousandth of a radius instead, so
-    that contacts begin elsewhere within a time step and sums round differently.
+    Fills take other seeds. Where grains come from a file, or there are none beside bodies, planes are moved back by up to a
+    thousandth of a radius instead, so that contacts begin elsewhere within a time step and sums round differently.
     """
     changed, random = deepcopy(parsed), np.random.default_rng(repeat)
     if repeat == 0:
         return changed
-    for fill in changed["fills"]:
-        if "file" not in fill:
-            fill["seed"] = int(fill.get("seed", 0)) + 1000 * repeat
-    if any("file" in fill for fill in changed["fills"]):
-        for plane in changed.get("boundaries", ()):
+    fills = changed.get("fills") or []
+    drawn = [fill for fill in fills if fill.get("file") is None]
+    for fill in drawn:
+        fill["seed"] = int(fill.get("seed") or 0) + 1000 * repeat
+    if len(drawn) < len(fills) or not fills:
+        for plane in changed.get("boundaries") or ():
             if plane.get("type") == "plane":
                 shift = 1e-3 * facts.radius * random.uniform() * unit(plane["normal"])
                 plane["point"] = [float(p) - float(s) for p, s in zip(plane["point"], shift, strict=True)]
@@ -178,9 +179,10 @@ def _change(node: Any, keys: list[str], change: Change, facts: Facts) -> None:
     place = int(key) if isinstance(node, list) else key
     present = place < len(node) if isinstance(node, list) else place in node
     if rest:
-        inner = node[place] if present else {}
+        there = present and node[place] is not None  # a section may be left empty
+        inner = node[place] if there else {}
         _change(inner, rest, change, facts)
-        if not present and inner:
+        if not there and inner:
             node[place] = inner
         return
     new = change(node[place] if present else None, facts)

@@ -186,3 +186,11 @@ def test_impact_needs_an_impact(small):
     parsed["gravity"] = [0, 0, 0]
     with pytest.raises(SceneError, match="an impact is one grain and one plane"):
         Study(parsed, folder, Plan("impact", 0.01, 1, ()))
+
+
+def test_impacts_of_bodies_have_no_closed_form(small):
+    parsed, folder = small
+    ball = {"spheres": [[0, 0, 0, 0.01]], "material": "sand", "pose": {"position": [0.0, 0.0, 0.05]}}
+    parsed |= {"gravity": [0, 0, 0], "fills": [], "tools": {}, "bodies": {"ball": ball}}
+    with pytest.raises(SceneError, match="that of spheres, not of clumps or bodies; choose another --quantity"):
+        Study(parsed, folder, Plan("impact", 0.01, 1, ()))

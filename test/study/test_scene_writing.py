@@ -56,21 +56,37 @@ def test_one_line_changes_and_all_others_stay(path, value, line):
 def test_relative_paths_start_at_the_new_folder(tmp_path):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes/a.stl").write_text("solid")
-    (tmp_path / "arm.urdf").write_text("<robot/>")
+    for name in ("arm.urdf", "hills.csv", "rock.npz", "clump.csv"):
+        (tmp_path / name).write_text("something")
     source = tmp_path / "scene.yaml"
     source.write_text(
-        "fills: []  # none\ntools:\n"
+        "fills: [{shape: clump.csv}, {shape: sphere}]  # two\ntools:\n"
         "  one: {mesh: meshes/a.stl}\n  two: {mesh: package://robot/b.stl}\n  three: {urdf: arm.urdf}\n"
+        "boundaries: [{mesh: meshes/a.stl}, {heights: hills.csv}]\n"
+        "bodies: {rock: {spheres: rock.npz}, bell: {spheres: [[0, 0, 0, 1]]}}\n"
     )
     target = tmp_path / "further/new.yaml"
     assert write_scene(source, yaml.safe_load(source.read_text()), target)
     written = target.read_text()
-    assert "# none" in written
-    assert yaml.safe_load(written)["tools"] == {
-        "one": {"mesh": "../meshes/a.stl"},
-        "two": {"mesh": "package://robot/b.stl"},
-        "three": {"urdf": "../arm.urdf"},
+    assert "# two" in written
+    assert yaml.safe_load(written) == {
+        "fills": [{"shape": "../clump.csv"}, {"shape": "sphere"}],
+        "tools": {
+            "one": {"mesh": "../meshes/a.stl"},
+            "two": {"mesh": "package://robot/b.stl"},
+            "three": {"urdf": "../arm.urdf"},
+        },
+        "boundaries": [{"mesh": "../meshes/a.stl"}, {"heights": "../hills.csv"}],
+        "bodies": {"rock": {"spheres": "../rock.npz"}, "bell": {"spheres": [[0, 0, 0, 1]]}},
     }
+
+
+def test_a_scene_of_bodies_alone_is_written_too(tmp_path):
+    source = tmp_path / "scene.yaml"
+    source.write_text("bodies: {bell: {spheres: [[0, 0, 0, 1]]}}\ntools:\nduration: 1\n")
+    edited = yaml.safe_load(source.read_text()) | {"duration": 2}
+    assert write_scene(source, edited, tmp_path / "new.yaml")
+    assert yaml.safe_load((tmp_path / "new.yaml").read_text()) == edited
 
 
 def test_what_cannot_be_changed_in_its_place_is_written_anew(tmp_path):

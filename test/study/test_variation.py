@@ -23,6 +23,8 @@ def test_missing_mappings_are_made_only_where_something_is_put_in():
     assert change({"fills": [{}]}, Edit("solver.skin", times(2.0)), Edit("fills.*.shape", where_given("sphere"))) == {
         "fills": [{}]
     }
+    assert change({"solver": None}, Edit("solver.precision", to("double"))) == {"solver": {"precision": "double"}}
+    assert change({"solver": None}, Edit("solver.skin", times(2.0))) == {"solver": None}
 
 
 @pytest.mark.parametrize(
@@ -64,6 +66,12 @@ def test_chance_changes_seeds_or_planes_and_nothing_else():
     for changed in (first, second):
         shift = 1.0 - changed["boundaries"][0]["point"][2]
         assert 0.0 < shift < 1e-3 * FACTS.radius
+
+
+def test_chance_moves_planes_where_there_are_only_bodies():
+    parsed = {"bodies": {"ball": {}}, "boundaries": [{"type": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}]}
+    assert repeated(parsed, 1, FACTS)["boundaries"][0]["point"][2] < 0.0
+    assert repeated({"bodies": {"ball": {}}}, 1, FACTS) == {"bodies": {"ball": {}}}
 
 
 def test_every_choice_has_several_settings_and_a_title_of_its_own():
