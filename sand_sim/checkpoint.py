@@ -165,9 +165,9 @@ def read_checkpoint(path: Path) -> Checkpoint:
             groups[group] = {}
             for name in header.pop(group):
                 groups[group][name], end = _read_array(content, end)
-        header["time"], commands = float(header["time"]), dict(header.pop("commands"))
+        header["time"], header["steps"], commands = float(header["time"]), int(header["steps"]), dict(header.pop("commands"))
         return Checkpoint(header, groups["state"], commands, groups["history"])
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise DamagedCheckpointError(f"{path}: cannot be understood: {error!r}") from None
 
 
@@ -203,8 +203,8 @@ def _read_array(content: memoryview, place: int) -> tuple[np.ndarray, int]:
     if np.lib.format.read_magic(start) != (1, 0):
         raise ValueError("an array of an unknown kind")
     shape, fortran, dtype = np.lib.format.read_array_header_1_0(start)
-    if dtype.hasobject or fortran:
-        raise ValueError("an array of objects")
+    if dtype.hasobject or fortran or any(size < 0 for size in shape):
+        raise ValueError("an array of objects, in another order or of no size")
     number, begin = int(np.prod(shape, dtype=object)), place + start.tell()
     array = np.frombuffer(content, dtype, number, begin).copy() if number else np.zeros(0, dtype)
     return array.reshape(shape), begin + number * dtype.itemsize

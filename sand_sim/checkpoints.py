@@ -58,9 +58,12 @@ class CheckpointFolder:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._handle = os.open(self.folder, os.O_RDONLY)
-            fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the system lets go of it however the process ends
+            try:
+                fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)  # the system lets go of it however the process ends
+            except OSError:
+                os.close(self._handle)
+                raise
         except BlockingIOError:
-            os.close(self._handle)
             raise CheckpointError(f"checkpoint folder {folder}: is used by another process; give each run its own") from None
         except OSError as error:
             raise CheckpointError(f"checkpoint folder {folder}: {error.strerror or error}") from None

@@ -51,7 +51,7 @@ def unpack_told(packed: dict, world: World) -> tuple[dict[str, Course], Counter[
                 setattr(course, time, -np.inf if entry[time] is None else float(entry[time]))
         rejected = Counter({str(reason): int(number) for reason, number in packed.get("rejected", {}).items()})
         frame_end, limited = float(packed.get("frame_end", 0.0)), int(packed.get("limited", 0))
-    except (KeyError, TypeError, ValueError, AttributeError, CommandError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, CommandError) as error:
         raise ValueError(f"commands: {error!r}") from None
     now, frame = world.time, world.frame_steps * world.time_step
     # The frame rate may be another one now.

@@ -1,5 +1,7 @@
 """Checkpoints: to the bit, whole or not at all, and only where they belong."""
 
+import hashlib
+import io
 import json
 import threading
 
@@ -117,6 +119,28 @@ def test_another_format_is_named(written):
     written.write_bytes(written.read_bytes().replace(b"checkpoint 1", b"checkpoint 2", 1))
     with pytest.raises(CheckpointError, match="is of format 2, this sand_sim reads 1"):
         read_checkpoint(written)
+
+
+@pytest.mark.parametrize(
+    ("header", "shape"),
+    [
+        ({}, (10**30,)),
+        ({}, (-1,)),
+        ({"time": 10**400}, (1,)),
+        ({"steps": None}, (1,)),
+        ({"steps": float("inf")}, (1,)),
+        ({"state": 3}, (1,)),
+    ],
+)
+def test_what_a_sound_checksum_lets_through_is_refused_too(tmp_path, header, shape):
+    array = io.BytesIO()
+    np.lib.format.write_array_header_1_0(array, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    words = json.dumps({"time": 0.0, "steps": 0, "commands": {}, "state": ["one"], "history": []} | header).encode()
+    content = b"sand_sim checkpoint 1\n" + len(words).to_bytes(8, "little") + words + array.getvalue() + bytes(8)
+    path = tmp_path / "strange.checkpoint"
+    path.write_bytes(content + hashlib.sha256(content).digest())
+    with pytest.raises(DamagedCheckpointError, match="cannot be understood"):
+        read_checkpoint(path)
 
 
 def test_what_is_no_file_is_refused(world, tmp_path):

@@ -172,6 +172,7 @@ def test_a_bad_file_changes_nothing_and_is_named(scene, uninterrupted, tmp_path)
         {"courses": {"plate": TIMES | {"waiting": [POSE | {"more": 1}]}}},
         {"courses": {"plate": TIMES | {"promised": "soon", "waiting": []}}},
         {"rejected": {"late": "often"}},
+        {"limited": float("inf")},
     ],
 )
 def test_a_strangers_commands_are_refused(scene, tmp_path, commands):
