@@ -21,7 +21,11 @@ _ABANDONED = 3600.0  # [s] after which a half-written file belongs to a writer t
 
 
 def cache_folder() -> Path:
-    """Where bodies are kept: ``SAMPLER_CACHE``, else ``sampler`` in ``XDG_CACHE_HOME`` or ``~/.cache``."""
+    """Where bodies are kept: ``SAMPLER_CACHE``, else ``sampler`` in ``XDG_CACHE_HOME`` or ``~/.cache``.
+
+    Raises:
+        RuntimeError: if neither is set and nobody knows the user's home.
+    """
     given = os.environ.get("SAMPLER_CACHE")
     return Path(given) if given else Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "sampler"
 
@@ -42,7 +46,10 @@ def sample_file(path: str | Path, radius: float, scale: float = 1.0, *, cache: b
     path = Path(path)
     if path.suffix.lower() in (".gltf", ".glb"):  # its triangles may be kept in other files
         return sample_mesh(read_mesh(path, scale), radius, cache=cache, **options)
-    content = path.suffix.lower().encode() + path.read_bytes() if cache and path.is_file() else None
+    content = None
+    if cache:
+        with contextlib.suppress(OSError):  # of which ``read_mesh`` tells
+            content = path.suffix.lower().encode() + path.read_bytes()
     return _keep(content, lambda: read_mesh(path, scale), {"radius": radius, "scale": scale} | options)
 
 
@@ -65,7 +72,10 @@ def sample_mesh(mesh: trimesh.Trimesh, radius: float, *, cache: bool = True, **o
 
 def _keep(content: bytes | None, read: Callable[[], trimesh.Trimesh], options: dict) -> ParticleBody:
     """The body kept under the content, if there is one, else a new one, kept if there is a content."""
-    place = None if content is None else cache_folder() / f"{_key(content, options)}.npz"
+    place = None
+    if content is not None:
+        with contextlib.suppress(RuntimeError):  # as a folder that cannot be written
+            place = cache_folder() / f"{_key(content, options)}.npz"
     if place:
         with contextlib.suppress(MeshError):  # missing or damaged: sampled anew
             return load_body(place)

@@ -133,6 +133,25 @@ def test_a_folder_that_cannot_be_written_does_no_harm(box, folder):
     assert len(sample_file(box, 0.004)) > 100
 
 
+def test_without_a_home_bodies_are_sampled_all_the_same(box, monkeypatch):
+    def nobody():
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("SAMPLER_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", nobody)
+    assert len(sample_file(box, 0.004)) > 100
+
+
+def test_a_file_that_may_not_be_read_is_named(box, monkeypatch):
+    def forbidden(path):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "read_bytes", forbidden)
+    with pytest.raises(MeshError, match=r"mesh box\.stl: cannot be read: Permission denied"):
+        sample_file(box, 0.004)
+
+
 def run(*arguments):
     command = [sys.executable, "-W", "ignore", "-m", "sampler", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False, cwd=Path(__file__).parents[2])
