@@ -62,11 +62,13 @@ def _draw_curves(figure, columns: dict[str, np.ndarray], log: RunLog) -> None:
         rows[0].set_ylabel("force of the sand on the tool,\nworld frame [N]")
         rows[1].set_ylabel("torque about the tool frame's\norigin, tool frame [N m]")
         rows[0].legend(fontsize=8, ncols=3)
-    for name in names:
-        rows[-1].plot(time, columns[f"{name}.carried"], color="tab:brown", lw=1.4, label=f"carried by {name}")
-    rows[-1].set_ylabel("mass in the tool [kg]" if names else "kinetic energy [J]")
-    if not names:
-        rows[-1].plot(time, columns["kinetic"], lw=1.2)
+        for name in names:
+            rows[2].plot(time, columns[f"{name}.carried"], lw=1.4, label=name)
+        rows[2].set_ylabel("mass in the tool [kg]")
+        rows[2].legend(fontsize=8, ncols=3)
+    else:
+        rows[0].plot(time, columns["kinetic"], lw=1.2)
+        rows[0].set_ylabel("kinetic energy [J]")
     rows[-1].set_xlabel("simulated time [s]")
     for row in rows:
         row.grid(alpha=0.3)
