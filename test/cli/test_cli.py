@@ -69,6 +69,7 @@ def test_run_writes_everything_and_sums_up(tmp_path):
         name: given["density"] for name, given in written.items()
     }
     assert summary["versions"]["warp-lang"] == version("warp-lang")
+    assert summary["device"].startswith(("cpu, ", "cuda:")), "the one that was used, not what was asked for"
     for kind in ("rrd", "npz", "png"):
         assert (tmp_path / "results" / f"small.{kind}").stat().st_size > 1000
     for word in ("real-time factor", "peak draft", "energy balance", "energy from nowhere", "largest overlap / radius"):
