@@ -31,7 +31,11 @@ class Quantity(Protocol):
 
 
 def play(world: World, look: Callable[[Observation], dict], check: Callable[[], None]) -> Sample:
-    """Play a scene with its trajectories and keep what ``look`` sees in each frame; only the stepping is timed."""
+    """Play a scene with its trajectories and keep what ``look`` sees in each frame; only the stepping is timed.
+
+    Raises:
+        SceneError: if the scene has no frame.
+    """
     world.step(1)  # kernels are compiled and recorded before the clock starts
     world.reset()
     rows, times, spent, seen = [], [], 0.0, world.observe()
@@ -46,6 +50,8 @@ def play(world: World, look: Callable[[Observation], dict], check: Callable[[], 
         seen = world.observe()
         times.append(seen.time)
         rows.append(look(seen))
+    if not rows:
+        raise SceneError("duration: is less than half a frame, so there is nothing to compare; make it longer")
     values = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     return Sample(np.array(times), values, spent, seen.steps, world.time_step, seen.health.doubts)
 

@@ -80,6 +80,11 @@ def test_a_spread_of_nothing_is_refused(make_world):
         Spread().measure(world, lambda: None)
 
 
+def test_a_run_without_a_frame_is_refused(make_world):
+    with pytest.raises(SceneError, match="duration: is less than half a frame"):
+        Spread().measure(make_world([[0.0, 0.0, 0.0]], 0.005, duration=0.009, frame_rate=50.0), lambda: None)
+
+
 def test_mean_of_samples():
     mean = mean_sample([wrench(np.ones((100, 3))), wrench(3.0 * np.ones((100, 3)))])
     assert mean.values["tool force"] == pytest.approx(2.0 * np.ones((100, 3)))
