@@ -64,7 +64,7 @@ class DemArrays:
         lattice: the domain.
         table: the grains.
         walls: ``Surface`` structs.
-        bodies: tools.
+        tools: driven ones, then rough terrain.
         pairs: ``MaterialPair`` structs, one row per material.
         on: the device, from ``device.open_device``.
         drives: ``Plunger`` structs of the walls that move, in their order.
@@ -77,7 +77,7 @@ class DemArrays:
         lattice: Lattice,
         table: GrainTable,
         walls: list,
-        bodies: list[ToolBody],
+        tools: list[ToolBody],
         pairs: list,
         on,
         drives: Sequence = (),
@@ -124,8 +124,8 @@ class DemArrays:
         self.plungers = Plungers(list(drives), device) if drives else None
         self.plunger_states = self.plungers.states if drives else None
         farthest = float(table.radius.max()) + setting.listing_gap
-        self.tools = Tools(bodies, farthest, precision, device) if bodies else None
-        self.tool_list = self._contact_list(_FACES["tools"] * face) if bodies else None
+        self.tools = Tools(tools, farthest, precision, device) if tools else None
+        self.tool_list = self._contact_list(_FACES["tools"] * face) if tools else None
         self.touch = self.old_touch = None
         self.grain_blocks = wp.zeros(energy.blocks_for(number), dtype=wp.vec3d, device=device)
         self.make_room()

@@ -20,11 +20,11 @@ STABLE_FRACTION = 1.0  # of the largest step that is stable in a dense bed; a bo
 PARTING_FRACTION = 1.0 / 25.0  # of the shortest parting time
 TRAVEL_FRACTION = 0.05  # of the smallest radius, which nothing crosses in one step
 REFUSED = 3.0  # times the chosen step: a user's step beyond is refused unless forced
+_WRITTEN = 1.0001  # times the chosen step, which a user may have copied with few digits; beyond, a user's step is warned about
 _ROUNDED = 1e-3  # of what gravity gives, that rounding may take off or add, before what it does is carried over
 _RESISTED = 5e-3  # the same of what friction or rolling resistance takes
 _LEVEL = 1e-6  # of gravity: less of it along an axis is none
 _BED, _BOND = "stability of damped contacts", "range of cohesion"
-WARNED = 1.0  # times the chosen step: a user's step beyond is warned about
 
 
 def contact_time(radius: float, mass: float, young: float, speed: float) -> float:
@@ -131,7 +131,7 @@ def choose_time_step(
         scene: materials and the step asked for.
         smallest: smallest grain radius of each grain material [m].
         speed: fastest relative speed to expect [m/s].
-        spacings: of the particles of each rough tool, then of each terrain, in the order of the scene [m].
+        spacings: of the particles of each rough tool, then of each rough terrain, in the order of the scene [m].
         depth: overlap over radius up to which contacts shall be stable [1].
 
     Raises:
@@ -171,7 +171,7 @@ def choose_time_step(
             f"use 'auto' or at most {REFUSED * loose:.3g}, or set solver.force_time_step to see it fail"
         )
     warning = ""
-    if asked > WARNED * safe * 1.0001:
+    if asked > _WRITTEN * safe:
         warning = f"time step {asked:.3g} s is {asked / safe:.1f} times the safe step of {safe:.3g} s ({reason})"
     return TimeStep(asked, safe, contact, rayleigh, speed, reason, warning, stable)
 

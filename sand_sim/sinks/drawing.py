@@ -34,7 +34,7 @@ class Drawing:
         self._recording, self._world, self._particles = stream, world, particles
         self._draw_all_anew()
         stream.send_blueprint(_blueprint(world), make_active=False, make_default=True)
-        self._draw_still(world)
+        self._draw_still()
 
     def write(self, observation: Observation) -> None:
         """Add one observation."""
@@ -86,9 +86,9 @@ class Drawing:
         self._identity = np.zeros(0, int)
         self._drawn: dict[str, ToolModel] = {}
 
-    def _draw_still(self, world: World) -> None:
+    def _draw_still(self) -> None:
         """Draw what never changes: axes and walls."""
-        recording = self._recording
+        recording, world = self._recording, self._world
         recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         for boundary in world.scene.boundaries:
             if boundary.kind == "box":
