@@ -278,6 +278,28 @@ def test_a_history_stays_within_its_bound(tmp_path):
     assert steps[0] <= 1
     assert steps[-1] >= 1000 - 2 * 1000 / 10
     assert len(set(np.diff(steps))) == 1
+    resumed = RunLog(world.scene, most_rows=20)
+    resumed.unpack(log.pack())
+    for k in range(999, 1015):  # the frame of the checkpoint is seen again
+        resumed.write(replace(first, steps=k, time=0.02 * k))
+    assert len(set(np.diff(resumed.columns()["steps"]))) == 1, "also from before a checkpoint to after"
+    assert len(resumed.rows) < len(steps) + 3
+
+
+def test_a_file_of_an_earlier_run_stays_whole_where_a_new_one_cannot_be_written(world, tmp_path, monkeypatch):
+    def write_half(path, **arrays):
+        Path(path).write_bytes(b"half")
+        raise FULL
+
+    monkeypatch.setattr("sand_sim.sinks.run_log.np.savez_compressed", write_half)
+    history = tmp_path / "out" / "small.npz"
+    recorder = Recorder(world, output=tmp_path / "out", report=lambda line: None)
+    history.write_bytes(b"whole")
+    frames(recorder, world, 1)
+    recorder.close()
+    assert recorder.failed == [history]
+    assert history.read_bytes() == b"whole"
+    assert not list(history.parent.glob(".*"))
 
 
 def test_frames_are_written_in_few_pieces(tmp_path, world):

@@ -111,9 +111,11 @@ class Recorder:
         begin = self._output / self._world.scene.name
         for ending, write in ((".npz", self.log.save_history), (".json", self._save_summary), (".png", self._draw)):
             path = begin.with_name(begin.name + ending)
+            writing = path.with_name(f".writing-{path.name}")  # half a file is worse than none, or than that of an earlier run
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
-                write(path)
+                write(writing)
+                writing.replace(path)
                 files.append(path)
             except ModuleNotFoundError:
                 pass  # matplotlib is an extra; the npz holds all that the figure shows
@@ -121,7 +123,7 @@ class Recorder:
                 self._report(f"{path} cannot be written: {error.strerror or error}")
                 self.failed.append(path)
                 with contextlib.suppress(OSError):
-                    path.unlink(missing_ok=True)  # half a file is worse than none
+                    writing.unlink(missing_ok=True)
         return files
 
     def _save_summary(self, path: Path) -> None:

@@ -80,12 +80,14 @@ class RunLog:
     most_rows: int = 2**31
     _every: int = 1
     _frames: int = 0
+    _steps: int = -1  # at the last frame
 
     def write(self, observation: Observation) -> None:
         """Add one observation; a moment that is there already, before a checkpoint, is not added again."""
         health, self.last = observation.health, observation
-        if self.rows and self.rows[-1]["steps"] == observation.steps:
+        if observation.steps == self._steps:
             return
+        self._steps = observation.steps
         for phase in phases_at(self.scene, observation.time):
             self.views[phase] = View.of(observation)
         number, self._frames = self._frames, self._frames + 1
@@ -125,7 +127,8 @@ class RunLog:
     def pack(self) -> dict[str, np.ndarray]:
         """All but the last observation as plain arrays, for a checkpoint."""
         views = {phase: vars(view).items() for phase, view in self.views.items()}
-        packed = {"identity": np.array(self.identity)} | {f"row/{name}": column for name, column in self.columns().items()}
+        packed = {"identity": np.array(self.identity), "thinned": np.array([self._every, self._frames, self._steps])}
+        packed |= {f"row/{name}": column for name, column in self.columns().items()}
         return packed | {f"view/{phase}/{name}": array for phase, items in views.items() for name, array in items}
 
     def unpack(self, packed: dict[str, np.ndarray]) -> None:
@@ -146,11 +149,16 @@ class RunLog:
             raise ValueError("history: not of this scene")
         try:
             rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-            self.views, self.rows = {phase: View(**parts) for phase, parts in views.items()}, rows
+            views = {phase: View(**parts) for phase, parts in views.items()}
+            wall = float(rows[-1]["wall"]) if rows else 0.0
+            every, frames, steps = (int(number) for number in packed.get("thinned", (1, 0, -1)))
         except TypeError as error:
             raise ValueError(f"history: {error}") from None
+        if every < 1:
+            raise ValueError(f"history: every {every}th frame")
+        self.rows, self.views, self.started = rows, views, time.monotonic() - wall
+        self._every, self._frames, self._steps = every, frames, steps
         self.identity = str(packed.get("identity", self.identity))
-        self.started = time.monotonic() - (float(rows[-1]["wall"]) if rows else 0.0)
 
     def summarise(self) -> dict:
         """What a run comes down to, SI units."""
