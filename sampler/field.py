@@ -5,10 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from sampler.distance import SignedDistance
+from sampler.errors import MeshError
+from sampler.options import is_positive
 from sampler.sampling import thinnest_wall
 
 BLOCK = 8  # cells along the edge of a block
 _NODES = BLOCK + 1
+_BLOCK_MEMORY = 4 + 4 * _NODES**3  # [bytes] of its number and its values
 _TOGETHER = 400  # blocks evaluated in one go
 
 
@@ -88,7 +91,15 @@ def make_field(
         band: distance from the surface up to which values are needed [m], for a tool the largest grain's radius and more.
         cell: edge of a cell [m]; half the thinnest wall, and at most half the band, if None.
         memory: most to take [bytes]; cells grow until it suffices, see ``DistanceField.resolves_walls``.
+
+    Raises:
+        MeshError: if the band or the cell is not positive and finite, or not even one block fits into the memory.
     """
+    for name, value in (("band", band), ("cell", cell)):
+        if not (is_positive(value) or (name == "cell" and value is None)):
+            raise MeshError(f"{name} of a field must be positive, got {value!r}")
+    if not memory >= _BLOCK_MEMORY:
+        raise MeshError(f"memory of a field must be at least {_BLOCK_MEMORY} bytes, one block, got {memory!r}")
     wall = thinnest_wall(distance.surface)
     cell = min(0.5 * wall, 0.5 * band) if cell is None else cell
     corners = distance.surface.triangles.reshape(-1, 3)

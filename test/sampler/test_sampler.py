@@ -8,7 +8,7 @@ import pytest
 import trimesh
 from spread import distances, neighbours
 
-from sampler import MeshError, SignedDistance, locate_mesh, read_mesh, sample_body
+from sampler import MeshError, SignedDistance, locate_mesh, make_field, read_mesh, sample_body
 from sampler.surface import Surface
 
 MESHES = Path(__file__).parents[2] / "config" / "meshes"
@@ -179,6 +179,23 @@ def test_densities_that_make_no_sense_are_refused(sphere, density):
 def test_radii_that_make_no_sense_are_refused(sphere, radius, reason):
     with pytest.raises(MeshError, match=reason):
         sample_body(sphere, radius=radius)
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"band": 0.0}, "band of a field must be positive, got 0.0"),
+        ({"cell": float("nan")}, "cell of a field must be positive, got nan"),
+        ({"memory": 2000}, "memory of a field must be at least 2920 bytes, one block, got 2000"),
+    ],
+)
+def test_fields_that_make_no_sense_are_refused(sphere, options, reason):
+    with pytest.raises(MeshError, match=reason):
+        make_field(SignedDistance(sphere), **{"band": 0.01} | options)
+
+
+def test_the_smallest_field_is_one_block(sphere):
+    assert make_field(SignedDistance(sphere), 0.01, memory=2920).memory == 2920
 
 
 @pytest.mark.parametrize("radius", [1e-300, 1e-7, 1e4, 1e300])
