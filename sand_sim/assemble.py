@@ -104,9 +104,9 @@ class Assembly:
 
     @property
     def mesh_warnings(self) -> dict[str, tuple[str, ...]]:
-        """What the sampler had to mend or guess in meshes, by what messages call them; only of those where it had to.
+        """What the sampler had to mend or guess, by the labels of the meshes; without those of which all was well.
 
-        The mass of what is driven, or never moves, does not matter.
+        Doubts about a mass are left out for tools and terrains, which have none that counts.
         """
         told = {one.label: one.body.warnings for one in (*self.tools, *self.grounds)}
         told |= {one.label: one.warnings for one in self.bodies}
@@ -229,9 +229,9 @@ def build_solver(assembly: Assembly, setting: Setting, device, progress: Progres
 
 
 def _open_device(scene: Scene, spheres: int):
-    """The scene's device; a small scene gets few threads, because they would wait for each other longer than they work.
+    """The scene's device. A small scene gets few threads: more would wait for each other longer than they work.
 
-    Far more than there are cores would all but stand still.
+    However many the user asks for, they are bounded by the cores: far more threads than cores all but stand still.
     """
     cores = available_cores()
     threads = min(scene.solver.threads or min(cores, 1 + spheres // _SPHERES_PER_THREAD), _CROWDED * cores)

@@ -11,7 +11,7 @@ from sand_sim.scene.pairing import effective_young, pair_numbers
 from sand_sim.scene.stable_step import DEEP, particles_touched
 
 _CROWD = 2.0  # spheres of a surface that a grain may touch at once in an impact
-_DASHPOTS = 50.0  # times its speed as which the dashpots of a grain in a dense bed may push it
+_DASHPOTS = 50.0  # times its own speed: the most that dashpots in a dense bed may give a grain
 _COARSE = 0.1  # resolution over the overlap under a grain's own weight, or of an impact at the expected speed
 
 
@@ -32,7 +32,7 @@ def find_overlap(assembly: Assembly) -> tuple[str, ...]:
 
 
 def _strained(assembly: Assembly) -> str:
-    """What grains overlap where most energy is stored in a contact."""
+    """What the grain overlaps in the contact that stores most energy."""
     arrays, most = assembly.solver.arrays, {}
     for name, contacts in arrays.lists.items():
         energy = arrays.energy[name].numpy()[: contacts.pairs.get()]
@@ -56,7 +56,7 @@ def _harmless(assembly: Assembly) -> float:
 
 
 def _driven(assembly: Assembly) -> float:
-    """How fast what is stored in contacts makes a grain at most, ``F/sum(f) sqrt(2 E/m)``; nothing where forces balance [m/s].
+    """Highest speed that energy stored in contacts can give a grain, ``F/sum(f) sqrt(2 E/m)`` [m/s]; zero where forces balance.
 
     F is the sum of contact forces f and weight, E the energy of the contacts, half of it where both sides are grains.
 
@@ -104,7 +104,7 @@ def find_fine_surfaces(assembly: Assembly) -> tuple[str, ...]:
 
 
 def _coarse_enough(radius: float, overlap: float, spread: float) -> float:
-    """Radius [m] of spheres ``spread`` radii apart of which a grain touches no more than may be, by ``particles_touched``."""
+    """Radius [m] from which on a grain touches few enough spheres ``spread`` radii apart, by ``particles_touched``."""
     share = particles_touched(radius, 0.0, spread, overlap) / (_CROWD * radius)
     return 1.05 * 0.5 * (share + np.sqrt(share * (share + 4.0 * radius)))  # more, because it is shown rounded
 

@@ -64,7 +64,7 @@ def carry_over(old: Assembly, new: Assembly, replaced: int | None = None) -> Non
 
 
 def _rescale(state: dict[str, np.ndarray], share: float, grains: int) -> None:
-    """Say all that is in quanta in others, ``share`` of which make an old one; so many grains are there."""
+    """Convert all lengths in quanta to new quanta, ``share`` of which make an old one; ``grains`` is how many there are."""
     for kind, number in (("grains", grains), ("bodies", len(state.get("bodies.place", ())))):
         if number:
             place, remainder = state[f"{kind}.place"][:number], state[f"{kind}.remainder"][:number]
@@ -153,7 +153,7 @@ def expect_layout(loaded: dict[str, np.ndarray], state: dict[str, np.ndarray]) -
 
 
 def _added_rows(assembly: Assembly, radius: np.ndarray, density: np.ndarray, material: np.ndarray) -> GrainTable:
-    """Grains whose places a state knows better."""
+    """Rows for the grains that a state has added; their places come from the state later."""
     shapes = {rows.shape for rows in (radius, density, material)}
     sound = len(shapes) == 1 and radius.ndim == 1 and np.isfinite(radius).all() and np.isfinite(density).all()
     if not (sound and (radius > 0.0).all() and (density > 0.0).all() and np.isin(material, assembly.table.material).all()):

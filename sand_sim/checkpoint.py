@@ -27,7 +27,7 @@ _GROUPS = ("state", "history")
 
 
 class CheckpointError(ValueError):
-    """A checkpoint that cannot be written or gone on from; the message names the file and the reason."""
+    """A checkpoint that cannot be written, or that a run cannot go on from; the message names the file and the reason."""
 
 
 class DamagedCheckpointError(CheckpointError):
@@ -181,7 +181,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def _conditions(world: World) -> dict:
-    """What must be the same where a checkpoint is gone on from."""
+    """What must be the same in two worlds for one to go on from the other's checkpoint."""
     return {"scene": world.identity, "time_step": world.time_step, "precision": world.scene.solver.precision}
 
 

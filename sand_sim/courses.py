@@ -81,7 +81,7 @@ class Courses:
 
     Attributes:
         limited: number of commands that were slowed to keep to ``max_speed``.
-        delays: by how much later than asked a tool got to where it was told to be for that, at most [s], by its name.
+        delays: longest time by which ``max_speed`` made a tool late [s], by its name.
         unstamped: number of poses without a time that were carried out.
         alike: number of commands with the time of the one before, which have taken its place.
         shift: from the clock of relative stamps to simulated time [s]; None before the first of them.

@@ -14,7 +14,7 @@ class Interruption:
     """
 
     def __init__(self):
-        self._asked = False  # no event: a signal may come while one before it is handled, and would wait for its lock for ever
+        self._asked = False  # not an Event: a second signal inside of set() would wait for its lock for ever
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._ask)
 

@@ -12,7 +12,7 @@ from sand_sim.tool_model import Progress
 
 _CHUNKS = 50
 _FALL = 0.3  # of the speed at which the highest grain would end its fall
-_THROWN = 10.0  # times the speed of a bed at rest: what is given so much was meant to fly
+_THROWN = 10.0  # times the speed of a bed at rest: grains that are given more are meant to fly
 _SLOWED = 0.2  # share of the time in which drag slows grains down, after which it is applied anew
 
 
@@ -111,14 +111,14 @@ def _check_room(assembly: Assembly, thrown: np.ndarray) -> None:
 
 
 def _spent(assembly: Assembly) -> list[str]:
-    """Told where grains that shall hit a bed have hit it, and lie there, before time zero."""
+    """Warnings of fills that are thrown: by time zero their grains have landed."""
     scene, speed = assembly.scene, np.linalg.norm(assembly.table.velocity, axis=1)
     fast, first, told = assembly.grain_of_sphere[speed > _THROWN * scene.settle.speed], 0, []
     for fill, number in zip(scene.fills, assembly.fill_numbers, strict=True):
         if np.any((fast >= first) & (fast < first + number)):
             told.append(
                 f"settle: fill '{fill.name}' is given a velocity, which it has lost by time zero, as it flies while others "
-                "settle; let the bed settle in a scene of its own, and read it from a file where it shall be hit, or throw a body"
+                "settle; settle the bed in a scene of its own and read its grains from a file here, or throw a body"
             )
         first += number
     return told
@@ -151,7 +151,7 @@ def _slow_down(assembly: Assembly, share: float) -> None:
 
 
 def _strike_off(assembly: Assembly) -> list[str]:
-    """Take away what lies above the asked height of a fill; told is where nothing comes near to it."""
+    """Take away what lies above the asked height of each fill; returns warnings of fills that do not come near to it."""
     cloud, first, told = observe_grains(assembly), 0, []
     for fill, number in zip(assembly.scene.fills, assembly.fill_numbers, strict=True):
         if fill.height is not None:

@@ -307,7 +307,7 @@ class World(Changeable):
             self._kept_steps = self._solver.steps_done
 
     def _go_back(self, cause: str) -> UnstableError:
-        """Restore the last good state; the error to raise for what came after it."""
+        """Restore the last good state, and make the error to raise, which names the cause."""
         blown = self.time
         self.restore(self._good)
         safe = self.assembly.safe_step(self._good_health.fastest, self._good_health.deepest)

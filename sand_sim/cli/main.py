@@ -12,7 +12,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command line.
 
     Returns:
-        Exit code: 0 done, 1 refused with one line that says why, 130 interrupted, 141 nobody reads on what it tells.
+        Exit code: 0 done, 1 refused with one line that says why, 130 interrupted, 141 nobody reads its output any more.
     """
     interruption = Interruption()  # before the long imports
     with perhaps_unread():

@@ -10,11 +10,11 @@ UNREAD = 141  # exit code, by which shells tell that a program ended because nob
 
 @contextmanager
 def perhaps_unread() -> Iterator[None]:
-    """End quietly what is within when the reader of its output has gone."""
+    """End the code inside quietly when the reader of its output has gone."""
     try:
         try:
             yield
         finally:
-            sys.stdout.flush()  # now; at its end Python tells it as an error
+            sys.stdout.flush()  # now: at exit Python would report the broken pipe as an error
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what is still in the buffer

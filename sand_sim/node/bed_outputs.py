@@ -116,7 +116,7 @@ class BedOutputs:
 
 
 def coarse_points(world: World) -> list[str]:
-    """A warning where points, in the single precision of messages, are coarser than the simulation, as far from the origin."""
+    """A warning where the single precision of messages rounds points far from the origin more than the simulation does."""
     lattice, smallest = world.assembly.lattice, min(world.assembly.smallest.values())
     resolution = float(np.spacing(np.float32(np.abs([lattice.low, lattice.high]).max())))
     if resolution <= _COARSE_POINTS * smallest:
@@ -126,7 +126,7 @@ def coarse_points(world: World) -> list[str]:
 
 
 def _grid(world: World, asked: float) -> tuple[np.ndarray, float, tuple[int, int]]:
-    """Low corner, cell and shape of the height map; a cell that nobody has asked for is as large as it must be."""
+    """Low corner, cell and shape of the height map; where no cell is asked for, one large enough for ``_MOST_CELLS``."""
     scene, grains = world.scene, world.observe().grains
     low, cell, shape = bed_grid(scene, grains, asked or None)
     least = cell * float(np.sqrt(np.prod(shape, dtype=float) / _MOST_CELLS))

@@ -136,7 +136,7 @@ class EntityServices:
     def _state(self, report: ToolReport | BodyReport, time: float):
         velocity = report.velocity
         if isinstance(report, BodyReport):
-            # Told is that of the centre of mass.
+            # The report has the velocity of the centre of mass.
             model = next(model for model in self._simulation.world.assembly.bodies if model.body.name == report.name)
             velocity = velocity - np.cross(report.spin, rotation.rotate(report.orientation, model.shape.middle))
         return report_to_state(report, velocity, time, self._frames.root)

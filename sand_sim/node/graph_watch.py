@@ -1,4 +1,4 @@
-"""Other nodes that publish what they should not, which the middleware does not tell of."""
+"""Other nodes that publish what they should not: the middleware keeps quiet about them."""
 
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from rclpy.node import Node
@@ -16,7 +16,7 @@ _TWO_OF_A_NAME = (
 
 
 class GraphWatch:
-    """Warns once of each publisher that means to drive a tool and is not heard, or that tells another time than ours.
+    """Warns once of each publisher that tries to drive a tool but is not heard, or that publishes another time than ours.
 
     Args:
         node: that listens.

@@ -1,4 +1,4 @@
-"""Real time that is not kept while tools are driven by the wall clock: they are faster in the sand than anybody means."""
+"""A warning where simulated time lags behind the wall clock that tools are driven by: in the sand they move too fast then."""
 
 import time
 from collections.abc import Callable

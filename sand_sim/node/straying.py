@@ -44,7 +44,7 @@ class StrayWatch:
         return strayed
 
     def look_at_delays(self, courses: Courses) -> None:
-        """Tools that cannot be in time where they are told to be show in no other way than that they are slow."""
+        """Warn of tools that ``max_speed`` makes late, which nothing else shows."""
         for tool, delay in dict(courses.delays).items():
             if delay > _LATE and tool not in self._told_late:
                 self._told_late.add(tool)

@@ -125,10 +125,10 @@ class ToolInputs:
             self._submit(lambda: ToolPose(tool, *self.frames.in_root(name, _NO_MOVE, _NO_TURN), time=latest or None), tool)
 
     def _newest(self, times: list[float]) -> float:
-        """The newest of the times of frames that hang on each other [s].
+        """The newest of the times of frames that hang on each other [s]; those ahead of now do not count beside others.
 
-        Frames that hold for a while are stamped ahead, as localisation does with that of the odometry, by a second and at 2 Hz;
-        they would stand for all that the arm tells meanwhile. In lockstep, and by another clock, nobody knows what is ahead.
+        Localisation stamps the frame of the odometry a second ahead, because it holds until then, twice a second; with that stamp
+        nothing that the arm tells meanwhile would be newer. In lockstep, and by another clock, nobody knows what is ahead.
         """
         last = self._last()
         if last is None or self._simulation.pacing == "lockstep" or self._parameters["stamps"] != "simulated":

@@ -104,7 +104,7 @@ def smallest_sphere(fills: Iterable[Fill]) -> float | None:
 
 
 def smallest_of_materials(fills: Iterable[Fill], table: GrainTable, order: list[str]) -> dict[str, float]:
-    """Smallest radius of each grain material [m], of fills that draw it the least they may draw, whatever the seed."""
+    """Smallest radius of each grain material [m]; of radii that are drawn, the smallest that any seed could draw."""
     drawn = {order[k]: float(table.radius[table.material == k].min()) for k in np.unique(table.material)}
     fills = [fill for fill in fills if fill.file is None]
     limits = {name: smallest_sphere(fill for fill in fills if fill.material == name) for name in drawn}
@@ -120,7 +120,7 @@ def _smallest(fill: Fill) -> float:
 
 
 def _clear(solid, points: np.ndarray, gap: float) -> np.ndarray:
-    """Whether points are as far as a gap from a solid, shape (n,); of one with a box only those near it are measured."""
+    """Whether points are a gap or more from a solid, shape (n,); where it has a box, only points near that are measured."""
     gap *= 1.0 - 1e-6  # a region that ends at a wall has places that are as far, but for rounding
     if not hasattr(solid, "box"):
         return solid.distance(points) > gap
@@ -132,7 +132,7 @@ def _clear(solid, points: np.ndarray, gap: float) -> np.ndarray:
 
 
 def _clear_of_grains(table: GrainTable, points: np.ndarray, gap: float) -> np.ndarray:
-    """Whether spheres as large as a gap would overlap none of a table, shape (n,)."""
+    """Whether points are a gap or more from the surfaces of all spheres of a table, shape (n,)."""
     clear = np.ones(len(points), bool)
     for one, _ in overlapping(points, np.full(len(points), gap), table.position, table.radius):
         clear[one] = False
@@ -190,11 +190,11 @@ def _seat(
         points: places with room for the largest, lowest first, shape (m, 3) [m].
         radius: that each grain reaches, shape (n,) [m].
         largest: that they may reach [m].
-        obstacles: tell which points are clear of something, all of ``points`` are.
+        obstacles: each tells which of some points are at least a gap away from it; all of ``points`` are so by ``largest``.
         random: where chance comes from.
 
     Returns:
-        Positions, shape (n, 3) [m], if there is room; for about how many like them there is.
+        Positions, shape (n, 3) [m], of use only if there is room for all; about how many grains there is room for.
     """
     level = np.clip(np.floor(np.log2(largest / radius)), 0, _FINEST).astype(int)
     number = np.bincount(level)
@@ -222,7 +222,7 @@ def _even(count: int) -> np.ndarray:
 
 
 def _count_for_height(fill: Fill, walls: list[Wall], random: np.random.Generator) -> int:
-    """Grains for a bed of the asked height; the cross section is what the walls leave of the region, by random points."""
+    """Number of grains for a bed of the asked height; random points tell how much of the region the walls leave."""
     low, high = np.asarray(fill.low), np.asarray(fill.high)
     top = np.array([high[0], high[1], low[2] + fill.height])
     samples = random.uniform(low, top, (200_000, 3))

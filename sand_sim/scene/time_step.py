@@ -21,8 +21,8 @@ PARTING_FRACTION = 1.0 / 25.0  # of the shortest parting time
 TRAVEL_FRACTION = 0.05  # of the smallest radius, which nothing crosses in one step
 REFUSED = 3.0  # times the chosen step: a user's step beyond is refused unless forced
 _WRITTEN = 1.0001  # times the chosen step, which a user may have copied with few digits; beyond, a user's step is warned about
-_ROUNDED = 1e-3  # of what gravity gives, that rounding may take off or add, before what it does is carried over
-_RESISTED = 5e-3  # the same of what friction or rolling resistance takes
+_ROUNDED = 1e-3  # share of what gravity adds in a step that rounding may change before its errors are carried over
+_RESISTED = 5e-3  # the same share of what friction or rolling resistance takes
 _LEVEL = 1e-6  # of gravity: less of it along an axis is none
 _BED, _BOND = "stability of damped contacts", "range of cohesion"
 

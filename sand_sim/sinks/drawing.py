@@ -82,7 +82,7 @@ class Drawing:
             recording.log(f"health/{name}", rr.Scalars(value))
 
     def _draw_all_anew(self) -> None:
-        """Draw also what has not changed next time."""
+        """Next time draw also what has not changed."""
         self._identity = np.zeros(0, int)
         self._drawn: dict[str, ToolModel] = {}
 

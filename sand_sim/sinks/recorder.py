@@ -19,7 +19,7 @@ class RecordingError(ValueError):
 
 
 def require_rerun() -> None:
-    """See that recordings can be made, before the work begins that they are to be of.
+    """See that recordings can be made, before the long work that they shall show.
 
     Raises:
         RecordingError: if Rerun cannot be imported.
@@ -148,7 +148,7 @@ class Recorder:
 def _open_sinks(
     world: World, recording: Path | None, view: bool, particles: bool, identity: str, report: Callable[[str], None]
 ) -> dict:
-    """Sinks by the names that they are spoken of."""
+    """Sinks by the names that messages give them."""
     require_rerun()
     from sand_sim.sinks.recording_file import RecordingFile
     from sand_sim.sinks.viewer import Viewer, open_viewer

@@ -1,4 +1,4 @@
-"""Studies of the package's own scenes, made short enough for one sitting, and what others get."""
+"""How scenes are studied: the package's own made short enough for one sitting, all others as they are."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -119,7 +119,7 @@ def steps(factor: float) -> Change:
 
 
 def automatic(old: Any, facts: Facts) -> Any:
-    """Leave the choice to the scene where it is not left to it already."""
+    """Make an entry ``auto`` where it is not so already."""
     return None if old in (None, "auto") else "auto"
 
 
