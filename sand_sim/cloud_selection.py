@@ -34,7 +34,7 @@ def select_box(cloud: GrainCloud, low: np.ndarray, high: np.ndarray) -> GrainClo
         high: highest corner, shape (3,) [m].
 
     Raises:
-        ValueError: if a corner is not a number or not below the other.
+        ValueError: if a corner has not three numbers, or is not below the other.
     """
     return take_grains(cloud, in_box(cloud.position, low, high))
 
@@ -42,7 +42,9 @@ def select_box(cloud: GrainCloud, low: np.ndarray, high: np.ndarray) -> GrainClo
 def in_box(position: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Whether points, shape (n, 3), are in a box, shape (n,); see ``select_box``."""
     low, high = np.asarray(low, float), np.asarray(high, float)
-    if low.shape != (3,) or high.shape != (3,) or not np.all(low < high):
+    if low.shape != (3,) or high.shape != (3,):
+        raise ValueError(f"box: corners must be of shape (3,), not {low.shape} and {high.shape}")
+    if not np.all(low < high):
         raise ValueError(f"box: every coordinate of low {low.tolist()} must be below that of high {high.tolist()}")
     inside = np.ones(len(position), bool)
     for axis in range(3):

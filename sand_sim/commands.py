@@ -15,17 +15,21 @@ def check_command(command: Command) -> Command:
     """The command, its orientation brought to length one.
 
     Raises:
-        CommandError: if pose or velocity are not of their shape, they or the time are not finite, or the quaternion is zero.
+        CommandError: if pose, velocity or time are no finite numbers, not of their shape, or the quaternion is zero.
     """
     tool = f"tool '{command.tool}'"
     moving = isinstance(command, ToolVelocity)
     names = ("linear", "angular") if moving else ("position", "orientation")
-    values = {name: np.asarray(getattr(command, name), float) for name in names}
+    try:
+        values = {name: np.asarray(getattr(command, name), float) for name in names}
+        finite = all(np.isfinite(value).all() for value in (*values.values(), command.time or 0.0))
+    except (TypeError, ValueError):
+        raise CommandError("misshapen", f"{tool}: {names[0]}, {names[1]} and time must be numbers") from None
     for name, value in values.items():
         shape = (4,) if name == "orientation" else (3,)
         if value.shape != shape:
             raise CommandError("misshapen", f"{tool}: {name} must be of shape {shape}, not {value.shape}")
-    if not np.all(np.isfinite(np.concatenate([*values.values(), [command.time or 0.0]]))):
+    if not finite:
         raise CommandError("not_finite", f"{tool}: {names[0]}, {names[1]} and time must be finite")
     if not moving:
         try:

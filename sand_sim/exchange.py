@@ -91,7 +91,10 @@ def find_grains(assembly: Assembly, cloud: GrainCloud, identity, box) -> np.ndar
         first = sum(assembly.fill_numbers)
         named = (cloud.identity >= first) & (cloud.identity < first + len(assembly.bodies))
         return cloud.identity[inside & ~named]
-    asked = np.unique(np.asarray(identity).ravel())
+    try:
+        asked = np.unique(np.asarray(identity).ravel())
+    except (TypeError, ValueError) as error:
+        raise CommandError("shape", f"remove_grains: identities: {error}") from None
     if len(asked) and asked.dtype.kind not in "iu":
         raise CommandError("shape", "remove_grains: identities must be whole numbers")
     unknown = asked[~np.isin(asked, cloud.identity)]

@@ -241,6 +241,7 @@ def test_box_takes_what_is_inside(tmp_path):
         ({"identity": [3, 77, 99]}, "2 of 3 grains are not in the domain: 77, 99"),
         ({"identity": [0.5]}, "whole numbers"),
         ({"identity": "all"}, "whole numbers"),
+        ({"identity": [[1], [2, 3]]}, "remove_grains: identities: "),
         ({}, "either identities or a box"),
         ({"identity": [3], "box": ([0.0] * 3, [1.0] * 3)}, "either identities or a box"),
         ({"box": ([1.0] * 3, [0.0] * 3)}, "box"),

@@ -30,9 +30,11 @@ def test_box(cloud):
     expected = [k for k, point in enumerate(cloud.position) if all(low <= point) and all(point <= high)]
     assert select_box(cloud, low, high).identity.tolist() == expected
     assert len(select_box(cloud, [5.0] * 3, [6.0] * 3)) == 0
-    for corner in ([0.1, 0.0, 0.0], [np.nan, 0.0, 0.0], [0.0, 0.0]):
+    for corner in ([0.1, 0.0, 0.0], [np.nan, 0.0, 0.0]):
         with pytest.raises(ValueError, match="box: every coordinate"):
             select_box(cloud, corner, [0.1, 0.1, 0.1])
+    with pytest.raises(ValueError, match=r"box: corners must be of shape \(3,\), not \(2,\) and \(3,\)"):
+        select_box(cloud, [0.0, 0.0], [0.1, 0.1, 0.1])
 
 
 @pytest.mark.parametrize("edge", [0.003, 0.02, 0.07, 3.0])  # the first is sparse, the last one voxel or eight

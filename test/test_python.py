@@ -25,11 +25,17 @@ def test_reports_that_are_not_there_are_told(world, kind, known):
         ([0.0, 0.0], [0.0, 0.0, 0.0, 1.0], r"tool 'plate': position must be of shape \(3,\), not \(2,\)"),
         ([0.0, 0.0, 0.1], [0.0, 0.0, 0.1], r"tool 'plate': orientation must be of shape \(4,\), not \(3,\)"),
         ([[0.0, 0.0, 0.1]], [0.0, 0.0, 0.0, 1.0], r"tool 'plate': position must be of shape \(3,\), not \(1, 3\)"),
+        (["a", "b", "c"], [0.0, 0.0, 0.0, 1.0], "tool 'plate': position, orientation and time must be numbers"),
     ],
 )
 def test_poses_of_another_shape_are_refused(world, position, orientation, told):
     with pytest.raises(CommandError, match=told):
         world.apply(ToolPose("plate", np.array(position), np.array(orientation)))
+
+
+def test_a_time_that_is_no_number_is_refused(world):
+    with pytest.raises(CommandError, match="position, orientation and time must be numbers"):
+        world.apply(ToolPose("plate", np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 0.0, 1.0]), "soon"))
 
 
 @pytest.mark.parametrize(
