@@ -126,7 +126,7 @@ class CpuDevice:
 
     def __init__(self, threads: int | None = None):
         self.lanes = self.shares = threads or available_cores()
-        self.label = f"cpu, {self.lanes} threads"
+        self.label = f"cpu, {self.lanes} thread{'s' if self.lanes > 1 else ''}"
         give_way = ctypes.cast(ctypes.CDLL(None).sched_yield, ctypes.c_void_p).value
         self._meeting = wp.zeros(48, dtype=int, device="cpu")
         self.meeting_arguments = [self._meeting, self.lanes, _SPINS_BEFORE_YIELD, wp.uint64(give_way)]
