@@ -263,7 +263,7 @@ class Health:
         dissipated: what is missing from the balance of the above since the start [J]; negative means energy came from nowhere.
         momentum_residual: force on the grains that comes from no wall, tool or weight, over all their forces [1]; zero but for
             rounding as long as action equals reaction, NaN with an integrator that does not show it.
-        fastest: largest grain speed [m/s].
+        fastest: largest speed of the centre of a grain, or of a sphere of a clump or body [m/s].
         contacts: contacts under load.
         retired: grains that have left the domain.
         doubts: why the run should not be trusted, empty if nothing speaks against it.

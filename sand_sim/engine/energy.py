@@ -20,7 +20,10 @@ def blocks_for(items: int) -> int:
 
 @cache
 def build_grain_energy(recipe: Recipe) -> wp.Kernel:
-    """Kernel for energies of grains: ``blocks`` holds translation, rotation and height [J], ``fastest`` the top speed [m/s]."""
+    """Kernel for energies of spheres that are no members of a body: ``blocks`` holds translation, rotation and height [J].
+
+    ``fastest`` is the top speed of all spheres [m/s], members of clumps and bodies with what they gain by turning.
+    """
     precision, rotation, bodies = recipe.precision, recipe.rotation, recipe.bodies
     spin_type = precision.vec3 if recipe.integrator == VERLET else precision.vec4
     real, whole, vec3, vec4, whole4 = precision.real, precision.whole, precision.vec3, precision.vec4, precision.whole4
@@ -49,16 +52,16 @@ def build_grain_energy(recipe: Recipe) -> wp.Kernel:
             first = block * wp.static(BLOCK)
             for i in range(first, wp.min(first + wp.static(BLOCK), grains)):
                 here = place[i]
-                part = int(-1)
-                if wp.static(bodies):
-                    part = member[i]
-                if part >= 0:
-                    continue
                 if here[3] > whole(0):
                     of_i = motion[i]
                     velocity = vec3(of_i[0], of_i[1], of_i[2])
                     square = wp.dot(velocity, velocity)
-                    top = wp.max(top, square)
+                    top = wp.max(top, square)  # members count as well: their contacts, too, are as short as they are fast
+                    part = int(-1)
+                    if wp.static(bodies):
+                        part = member[i]
+                    if part >= 0:
+                        continue
                     height = -wp.dot(gravity, vec3(real(here[0]), real(here[1]), real(here[2])) * quantum)
                     turning = real(0.0)
                     if wp.static(rotation):

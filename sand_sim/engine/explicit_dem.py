@@ -27,7 +27,7 @@ class Sums:
         height: potential energy against the middle of the domain [J].
         elastic: energy stored in contacts [J].
         touching: contacts under load.
-        fastest: largest grain speed [m/s].
+        fastest: largest speed of a sphere, members of clumps and bodies included [m/s].
         deepest: largest overlap over the smaller radius since the start [1].
         carried_off: kinetic and potential energy of all that has left the domain [J].
     """

@@ -41,6 +41,15 @@ def test_torque_free_tumbling(make_bodies, precision, integrator):
     assert world.observe().health.kinetic == pytest.approx(energy, rel=1e-5)
 
 
+@pytest.mark.parametrize("integrator", ["velocity_verlet", "symplectic_euler"])
+def test_top_speed_is_that_of_the_fastest_sphere_of_a_body(make_bodies, integrator):
+    """``|v + w x r|``: a clump that flies or turns meets others as fast as that, and asks for as short a step."""
+    ends = [[-0.05, 0.0, 0.0, 0.01], [0.05, 0.0, 0.0, 0.01]]
+    bar = {"spheres": ends, "velocity": [0.0, 3.0, 0.0], "spin": [0.0, 0.0, 20.0]}
+    health = make_bodies({"bar": bar}, solver={"integrator": integrator}).observe().health
+    assert health.fastest == pytest.approx(3.0 + 20.0 * 0.05, rel=1e-6)
+
+
 def test_spheres_of_a_body_know_how_they_moved_over_the_last_step(make_bodies):
     """Friction springs grow by that; with the arms of now it would be off by half the angle that the body turns by in a step."""
     ends = [[-0.05, 0.0, 0.0, 0.01], [0.05, 0.0, 0.0, 0.01]]
