@@ -192,6 +192,25 @@ def count_grains(assembly: Assembly) -> int:
     return int(alone.sum() + (arrays.bodies.place.numpy()[:, 3] > 0).sum())
 
 
+def outer_force(assembly: Assembly, mass: float) -> tuple[np.ndarray, float]:
+    """What weight, walls, terrains and tools do to the grains now, shape (3,), and the sum of the sizes of it [N].
+
+    Args:
+        assembly: the world's, with forces brought up to now (``ExplicitDem.measure``).
+        mass: of all grains [kg].
+    """
+    arrays = assembly.solver.arrays
+    outer = mass * np.asarray(assembly.scene.gravity)
+    size = np.abs(outer).sum()
+    if arrays.wall_list:
+        on_grains = arrays.wall_list.force.numpy()[: arrays.wall_list.pairs.get(), :3].astype(float)
+        outer, size = outer + on_grains.sum(axis=0), size + np.abs(on_grains).sum()
+    if arrays.tools:
+        on_tools = arrays.tools.wrench.numpy()[:, 0]
+        outer, size = outer - on_tools.sum(axis=0), size + np.abs(on_tools).sum()
+    return outer, float(size)
+
+
 def momentum_residual(assembly: Assembly) -> float:
     """Net force on the grains now beyond what weight, walls and tools exert, over the sum of their sizes [1].
 
@@ -217,15 +236,8 @@ def momentum_residual(assembly: Assembly) -> float:
     if not gained.any():  # no step has been done
         return 0.0
     force = 2.0 * mass[:, None] * gained / dt
-    gravity = np.asarray(assembly.scene.gravity)
-    outer = mass.sum() * gravity
-    size = np.abs(force).sum() + np.abs(outer).sum()
-    if arrays.wall_list:
-        on_walls = arrays.wall_list.force.numpy()[: arrays.wall_list.pairs.get(), :3].astype(float)
-        outer, size = outer + on_walls.sum(axis=0), size + np.abs(on_walls).sum()
-    if arrays.tools:
-        on_tools = arrays.tools.wrench.numpy()[:, 0]
-        outer, size = outer - on_tools.sum(axis=0), size + np.abs(on_tools).sum()
+    outer, size = outer_force(assembly, mass.sum())
+    size += np.abs(force).sum()
     # Rounding of the velocities shows as a force, which matters where there are hardly any.
     rounding = assembly.recipe.precision.epsilon * np.abs(2.0 * mass[:, None] * now / dt).sum()
     return float(max(np.abs(force.sum(axis=0) - outer).max() - rounding, 0.0) / size) if size > 0.0 else 0.0

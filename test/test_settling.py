@@ -37,6 +37,24 @@ def test_the_walls_of_a_silo_bear_grains_that_do_not_fall_freely(tmp_path, settl
     assert least < on_floor < most
 
 
+@pytest.mark.parametrize("height", [0.04, None])
+def test_a_bed_is_borne_by_its_floor_from_time_zero_on(tmp_path, height):
+    """Also one that has just lost the load that was struck off, and would spring back: it neither falls nor rises."""
+    scene = SceneMaker(tmp_path).scene([[0.0, 0.0, 0.0]], 0.0025, gravity=[0.0, 0.0, -GRAVITY], precision="single")
+    region = {"low": [-0.03, -0.03, 0.0], "high": [0.03, 0.03, 0.3]}
+    fill = {"material": "grain", "radius": {"uniform": [0.0027, 0.0033]}, "region": region}
+    scene["fills"] = [fill | ({"height": height} if height else {"count": 800})]
+    sides = {"type": "box", "name": "bin", "material": "wall", "low": region["low"], "high": region["high"], "open": ["top"]}
+    scene |= {"boundaries": [sides], "settle": {"time": 1.0, "speed": 0.01}}
+    world, borne = World(read_scene(scene, tmp_path)), []
+    assert world.warnings == []
+    for _ in range(10):
+        seen = world.observe()
+        borne.append(-sum(wall.force[2] for wall in seen.walls) / (seen.grains.mass.sum() * GRAVITY))
+        world.step(round(0.002 / world.time_step))
+    assert borne == pytest.approx(np.ones(len(borne)), abs=0.05)
+
+
 @pytest.mark.parametrize("integrator", ["velocity_verlet", "symplectic_euler"])
 @pytest.mark.parametrize("kind", ["grain", "body"])
 def test_grains_fall_as_fast_as_asked(make_world, integrator, kind):
