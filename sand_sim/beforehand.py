@@ -98,7 +98,7 @@ def find_fine_surfaces(assembly: Assembly) -> tuple[str, ...]:
         if touched > _CROWD:
             doubts.append(
                 f"grains touch about {touched:.0f} {spheres} at once, so contacts are stiffer and restitution lower than "
-                f"asked; take a {field} of at least {_coarse_enough(radius, overlap, spacing / ball):.2g} m"
+                f"asked; take {field} of at least {_coarse_enough(radius, overlap, spacing / ball):.2g} m"
             )
     return tuple(doubts)
 
@@ -110,12 +110,12 @@ def _coarse_enough(radius: float, overlap: float, spread: float) -> float:
 
 
 def _layers(assembly: Assembly) -> Iterator[tuple[str, str, float, float, str]]:
-    """Spheres that make up surfaces: what they are called, their material, radius and spacing [m], and the field for it."""
+    """Spheres that make up surfaces: what they are called, their material, radius and spacing [m], and what to take instead."""
     bodies = [(f"particles of tool '{one.tool.name}'", one.tool.material, one.body) for one in assembly.tools if not one.smooth]
     bodies += [(f"particles of terrain '{one.name}'", one.material, one.body) for one in assembly.grounds if not one.smooth]
     for spheres, material, body in bodies:
-        yield spheres, material, body.radius, body.spacing, "particle_radius"
-    field = "rough.radius, and half the rough.spacing,"
+        yield spheres, material, body.radius, body.spacing, "contact: smooth, or a particle_radius"
+    field = "a rough.radius, and half the rough.spacing,"
     for wall in assembly.scene.boundaries:
         if wall.rough:
             yield f"virtual spheres of '{wall.name}'", wall.material, wall.rough.radius, wall.rough.spacing, field

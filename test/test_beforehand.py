@@ -50,7 +50,12 @@ def test_terrain_too_fine_is_doubted(make_world, tmp_path, particle, fine):
     terrain = {"type": "terrain", "name": "ground", "material": "wall", "mesh": "plate.stl", "particle_radius": particle}
     restitution, doubts = bounce(make_world, terrain)
     assert (restitution < 0.48) == fine
-    assert any("particles of terrain 'ground' at once" in doubt for doubt in doubts) == fine
+    told = [doubt for doubt in doubts if "particles of terrain 'ground' at once" in doubt]
+    assert (told != []) == fine
+    assert all("take contact: smooth, or a particle_radius of at least" in doubt for doubt in told)
+    restitution, doubts = bounce(make_world, terrain | {"contact": "smooth"})
+    assert restitution == pytest.approx(0.5, abs=0.01)
+    assert doubts == ()
 
 
 def test_the_largest_grain_decides_whether_a_surface_is_too_fine(make_world):
