@@ -91,11 +91,15 @@ def pose_on_trajectory(waypoints: tuple[Waypoint, ...], time: float) -> tuple[np
 
 
 def phases_of(waypoints: tuple[Waypoint, ...]) -> dict[str, tuple[float, float]]:
-    """Begin and end [s] of each named phase of a trajectory; neighbouring stretches of one name are one phase."""
+    """Begin and end [s] of each named phase of a trajectory; neighbouring stretches of one name are one phase.
+
+    The first waypoint's phase names no stretch, as no way leads to it.
+    """
     phases: dict[str, tuple[float, float]] = {}
     for before, after in pairwise(waypoints):
         if after.phase:
-            begin = phases[after.phase][0] if after.phase == before.phase else before.time
+            going_on = after.phase == before.phase and after.phase in phases
+            begin = phases[after.phase][0] if going_on else before.time
             phases[after.phase] = (begin, after.time)
     return phases
 
