@@ -142,7 +142,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     finest = smallest_sphere(scene.fills) if scene.tools or scene.bodies else None
     tools = [model_tool(tool, scene, finest, progress) for tool in scene.tools]
     for model in tools:
-        check_trajectory(model.tool, model.extent, 1.0 / scene.frame_rate)
+        check_trajectory(model.tool, model.reach, 1.0 / scene.frame_rate)
     grounds = [
         model_ground(one, scene.folder, lambda share, name=one.name: progress(f"sampling {name}", share))
         for one in scene.boundaries

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sand_sim import rotation
 from sand_sim.assemble import Assembly
 from sand_sim.integrator import VERLET
 
@@ -36,8 +37,9 @@ def driven_speed(assembly: Assembly) -> float:
     """Speed of the fastest point of all tools and plungers over the last step [m/s]."""
     arrays, speeds = assembly.solver.arrays, [0.0]
     if arrays.tools:
-        velocity, spin = np.linalg.norm(arrays.tools.twist.numpy(), axis=2).T
-        speeds += (velocity + spin * arrays.tools.shapes.numpy()["extent"]).tolist()
+        turns = arrays.tools.states.numpy()["rotation"]
+        for tool, (velocity, spin), turn in zip(assembly.tools, arrays.tools.twist.numpy(), turns, strict=False):  # grounds rest
+            speeds.append(np.linalg.norm(velocity) + tool.reach.swing(rotation.rotate(rotation.inverse(turn), spin)))
     if arrays.plungers:
         speeds += np.abs(arrays.plungers.states.numpy()["velocity"]).tolist()
     return max(speeds)

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from sand_sim.border import ToolPose
+from sand_sim.reach import Reach
 from sand_sim.scene.types import Pose, Scene, SceneError, Tool
 from sand_sim.track import SPEED_TOLERANCE, pose_on_trajectory, travel
 
@@ -34,12 +35,12 @@ def commands_at(scene: Scene, time: float) -> list[ToolPose]:
     return [ToolPose(tool.name, *pose_on_trajectory(tool.trajectory, time), time) for tool in driven]
 
 
-def check_trajectory(tool: Tool, extent: float, frame: float) -> None:
+def check_trajectory(tool: Tool, reach: Reach, frame: float) -> None:
     """See that a tool can follow its trajectory, before the run that would end where it cannot.
 
     Args:
         tool: with a trajectory or without.
-        extent: its farthest point from its origin [m].
+        reach: its reach.
         frame: time to the first pose that is played [s].
 
     Raises:
@@ -47,14 +48,14 @@ def check_trajectory(tool: Tool, extent: float, frame: float) -> None:
     """
     where, fastest = f"tools.{tool.name}", f"than its max_speed of {tool.max_speed:g} m/s"
     for number, (before, after) in enumerate(pairwise(tool.trajectory), 1):
-        speed = travel(_arrays(before.pose), _arrays(after.pose), extent) / (after.time - before.time)
+        speed = travel(_arrays(before.pose), _arrays(after.pose), reach) / (after.time - before.time)
         if speed > SPEED_TOLERANCE * tool.max_speed:
             raise SceneError(
                 f"{where}.trajectory[{number}]: on the way there a point of the tool moves at {speed:.3g} m/s, faster {fastest}; "
                 "give it more time or a shorter way, or raise 'max_speed'"
             )
     if tool.trajectory:
-        way = travel(_arrays(tool.pose), pose_on_trajectory(tool.trajectory, frame), extent)
+        way = travel(_arrays(tool.pose), pose_on_trajectory(tool.trajectory, frame), reach)
         if way > SPEED_TOLERANCE * tool.max_speed * frame:
             raise SceneError(
                 f"{where}.pose: is {way:.3g} m from where the trajectory has it after the first frame, {frame:.3g} s, farther "

@@ -12,7 +12,7 @@ from sampler.surface import Surface
 from sand_sim import rotation
 from sand_sim.scene.heights import read_heights
 from sand_sim.scene.types import SMOOTH, Boundary, Pose, SceneError, Terrain
-from sand_sim.true_surface import farthest, outward_triangles
+from sand_sim.true_surface import outward_triangles, reach_of_touched
 
 _DEPTH = 4.0  # of the solid below the lowest height of a smooth ground, in particle radii
 
@@ -50,7 +50,7 @@ class Ground:
     @property
     def extent(self) -> float:
         """Farthest point of what grains touch from the frame's origin [m]."""
-        return farthest(self.body, self.surface)
+        return reach_of_touched(self.body, self.surface).extent
 
     @property
     def smooth(self) -> bool:

@@ -10,8 +10,9 @@ import trimesh
 from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_mesh
 from sand_sim import rotation
 from sand_sim.link_mesh import model_link
+from sand_sim.reach import Reach
 from sand_sim.scene.types import SMOOTH, Scene, SceneError, Tool
-from sand_sim.true_surface import farthest, outward_triangles
+from sand_sim.true_surface import outward_triangles, reach_of_touched
 
 Progress = Callable[[str, float], None]
 
@@ -44,10 +45,15 @@ class ToolModel:
         """How far its surface lies outside the mesh [m]."""
         return 0.0 if self.smooth else self.body.radius
 
+    @cached_property
+    def reach(self) -> Reach:
+        """How far its surface reaches in the tool frame."""
+        return reach_of_touched(self.body, self.surface)
+
     @property
     def extent(self) -> float:
         """Farthest point of its surface from the tool frame's origin [m]."""
-        return farthest(self.body, self.surface)
+        return self.reach.extent
 
     @property
     def box(self) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from sand_sim import rotation
+from sand_sim.reach import Reach
 from sand_sim.scene.types import Pose, Scene, Waypoint
 
 SPEED_TOLERANCE = 1.02  # times its max_speed at which a tool is not yet too fast
@@ -58,16 +59,16 @@ class Track:
         return self.end_time - self.begin_time if self.end_time > self.begin_time else np.inf
 
 
-def travel(before: tuple[np.ndarray, np.ndarray], after: tuple[np.ndarray, np.ndarray], extent: float) -> float:
+def travel(before: tuple[np.ndarray, np.ndarray], after: tuple[np.ndarray, np.ndarray], reach: Reach) -> float:
     """How far any point of a tool moves at most on its way between two poses [m].
 
     Args:
         before: position, shape (3,) [m], and orientation, shape (4,).
         after: the same.
-        extent: farthest point of the tool from its origin [m].
+        reach: of the tool.
     """
-    turn = rotation.to_vector(rotation.multiply(after[1], rotation.inverse(before[1])))
-    return float(np.linalg.norm(after[0] - before[0]) + np.linalg.norm(turn) * extent)
+    turn = rotation.to_vector(rotation.multiply(rotation.inverse(before[1]), after[1]))  # in the tool frame
+    return float(np.linalg.norm(after[0] - before[0]) + reach.swing(turn))
 
 
 def pose_on_trajectory(waypoints: tuple[Waypoint, ...], time: float) -> tuple[np.ndarray, np.ndarray]:

@@ -4,20 +4,19 @@ import numpy as np
 
 from sampler import ParticleBody
 from sampler.surface import Surface
+from sand_sim.reach import Reach, reach_of
 
 _NEAR = 1e-5  # of the diagonal: where sides of a triangle are looked at
 
 
-def farthest(body: ParticleBody, surface: np.ndarray | None) -> float:
-    """Farthest point of what grains touch from the origin [m].
+def reach_of_touched(body: ParticleBody, surface: np.ndarray | None) -> Reach:
+    """Reach of what grains touch.
 
     Args:
         body: the particles.
         surface: of a smooth one, shape (n, 3, 3) [m], which counts instead.
     """
-    if surface is not None:
-        return float(np.linalg.norm(surface.reshape(-1, 3), axis=1).max())
-    return float(np.linalg.norm(body.points, axis=1).max() + body.radius)
+    return reach_of(body.points, body.radius) if surface is None else reach_of(surface.reshape(-1, 3), 0.0)
 
 
 def outward_triangles(triangles: np.ndarray) -> np.ndarray:

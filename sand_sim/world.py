@@ -158,7 +158,7 @@ class World(Changeable):
     def travel(self, command: ToolPose) -> float:
         """How far any point of the tool moves at most on its way from where it is to the commanded pose [m]."""
         index = self._tool_index[command.tool]
-        return travel(self._tracks[index].at(self.time), (command.position, command.orientation), self.tools[index].extent)
+        return travel(self._tracks[index].at(self.time), (command.position, command.orientation), self.tools[index].reach)
 
     def arrival(self, tool: str) -> float:
         """When a tool reaches, or has reached, its last commanded pose [s]."""

@@ -35,7 +35,7 @@ ROS = {
 # Who may import whom among the parts of sand_sim; a part may always import itself.
 BELOW = {
     "contact": {"precision"},
-    "engine": {"contact", "precision", "integrator", "grain_table", "rotation"},
+    "engine": {"contact", "precision", "integrator", "grain_table", "reach", "rotation"},
     "scene": {"contact", "precision", "integrator", "grain_table", "rotation"},
 }
 

@@ -41,8 +41,11 @@ def build_place_tools(precision: Precision) -> wp.Kernel:
         for tool in range(tracks.shape[0]):
             track = tracks[tool]
             if time > track.begin_time and time - dt < track.end_time:
-                rate = wp.length(track.velocity) + wp.length(track.spin) * wp.float64(shapes[tool].extent)
-                travelled[tool] = travelled[tool] + rate * dt
+                spin = wp.quat_rotate_inv(track.begin_rotation, track.spin)  # in the tool frame, as all the way
+                about = wp.vec3d(shapes[tool].arms)
+                swing = wp.dot(about, wp.vec3d(wp.abs(spin[0]), wp.abs(spin[1]), wp.abs(spin[2])))  # as ``Reach.swing``
+                swing = wp.min(swing, wp.length(spin) * wp.float64(shapes[tool].extent))
+                travelled[tool] = travelled[tool] + (wp.length(track.velocity) + swing) * dt
                 if travelled[tool] * inverse_quantum > wp.float64(0.5) * skin[0]:
                     tools_moved[0] = 1
             states[tool] = tool_state_at(track, twist[tool, 0], twist[tool, 1], time, centre, inverse_quantum, end)

@@ -8,6 +8,7 @@ import warp as wp
 from sand_sim.engine.smooth_tools import SLOTS, SmoothTools
 from sand_sim.engine.tools import ToolTrack, tool_types
 from sand_sim.precision import Precision
+from sand_sim.reach import Reach, reach_of
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Tools:
             shape.material = body.material
             first_slots.append(sum(map(len, particles)))
             if body.triangles is not None:
-                shape.extent = float(np.linalg.norm(body.triangles, axis=2).max())
+                _note_reach(shape, reach_of(body.triangles.reshape(-1, 3), 0.0), precision)
                 shapes.append(shape)
                 particles.append(np.zeros((SLOTS, 3)))
                 tool_of.append(np.full(SLOTS, index))
@@ -66,7 +67,7 @@ class Tools:
             keys = (cells[:, 2] * counts[1] + cells[:, 1]) * counts[0] + cells[:, 0]
             order = np.argsort(keys, kind="stable")
             shape.radius = body.radius
-            shape.extent = float(np.linalg.norm(points, axis=1).max() + body.radius)
+            _note_reach(shape, reach_of(points, body.radius), precision)
             shape.low = precision.vec3(*low)
             shape.inverse_cell = 1.0 / cell
             shape.nx, shape.ny, shape.nz = (int(c) for c in counts)
@@ -95,3 +96,7 @@ class Tools:
     def set_tracks(self, tracks: list) -> None:
         """Give all tools their tracks (``tools.ToolTrack``)."""
         self.tracks.assign(wp.array(tracks, dtype=ToolTrack, device="cpu"))
+
+
+def _note_reach(shape, reach: Reach, precision: Precision) -> None:
+    shape.extent, shape.arms = reach.extent, precision.vec3(*reach.arms)

@@ -28,6 +28,7 @@ def tool_types(precision: Precision):
     class ToolShape:
         radius: real  # [m] of each particle, 0 for a smooth tool
         extent: real  # [m] farthest point of its surface from the tool frame's origin
+        arms: vec3  # [m] farthest points of its surface from the axes of the tool frame
         material: int
         low: vec3  # [m] tool frame, lower corner of the particle cells
         inverse_cell: real  # [1/m]
