@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from sampler import sample_body
-from sand_sim.true_surface import farthest, outward_triangles
+from sand_sim.true_surface import outward_triangles, reach_of_touched
 
 BOX = np.asarray(trimesh.creation.box(bounds=[[-0.01, -0.02, -0.03], [0.05, 0.02, 0.04]]).subdivide().triangles)
 
@@ -18,9 +18,9 @@ def rolled(triangles):
 def test_the_farthest_point_is_a_corner_or_lies_a_particle_radius_beyond_the_farthest_particle():
     mesh = trimesh.Trimesh(**trimesh.triangles.to_kwargs(BOX))
     body = sample_body(mesh, 0.004)
-    assert farthest(body, BOX) == pytest.approx(np.sqrt(0.05**2 + 0.02**2 + 0.04**2), rel=1e-12)
+    assert reach_of_touched(body, BOX).extent == pytest.approx(np.sqrt(0.05**2 + 0.02**2 + 0.04**2), rel=1e-12)
     reach = [np.linalg.norm(point + 0.004 * point / np.linalg.norm(point)) for point in body.points]
-    assert farthest(body, None) == pytest.approx(max(reach), rel=1e-9)
+    assert reach_of_touched(body, None).extent == pytest.approx(max(reach), rel=1e-9)
 
 
 @pytest.mark.parametrize("apart", [0.1, 0.03])
