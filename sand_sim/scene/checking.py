@@ -86,7 +86,7 @@ def odd_numbers(scene: Scene) -> list[str]:
 
 
 def unused_numbers(scene: Scene) -> list[str]:
-    """What the scene gives for the sake of contact laws that it has not chosen, for whoever forgot to choose them; but zeros."""
+    """What the scene gives for contact laws that it has not chosen, for whoever forgot to choose them; a zero asks for none."""
     told, chosen = [], set(scene.contact.asks)
     for name in dict.fromkeys(name for rule in scene.pairs for name, number in rule.numbers.items() if number):
         if name not in chosen:
