@@ -53,6 +53,7 @@ def summary_text(summary: dict) -> str:
     for name, tool in summary["tools"].items():
         rows.append((f"{name}: peak draft", f"{tool['peak_draft_N']:.1f} N"))
         rows.append((f"{name}: peak lift", f"{tool['peak_lift_N']:.1f} N"))
+        rows.append((f"{name}: peak torque", f"{tool['peak_torque_Nm']:.3g} N m"))
         if "carried_kg" in tool:
             weight = tool["carried_weight_N"]
             rows.append((f"{name}: carried", f"{tool['carried_kg']:.3f} kg (the tool feels {weight:.2f} N)"))

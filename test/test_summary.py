@@ -24,11 +24,13 @@ def test_draft_is_against_the_motion_lift_is_down_and_what_is_lost_is_spilled(tm
         (0.5, [0.1, 0.0, 0.0], [-1.0, 0.0, -1.0], 0.0),
     ]
     for number, (time, velocity, force, mass) in enumerate(rows):
-        report = replace(first.tools[0], velocity=np.array(velocity), world_force=np.array(force), carried=mass)
+        felt = {"world_force": np.array(force), "torque": number * np.array([0.3, -0.4, 0.0])}
+        report = replace(first.tools[0], velocity=np.array(velocity), carried=mass, **felt)
         log.write(replace(first, time=time, steps=number, tools=(report,)))
     told = log.summarise()["tools"]["plate"]
     assert told["peak_draft_N"] == pytest.approx(5.0)
     assert told["peak_lift_N"] == pytest.approx(6.0)
+    assert told["peak_torque_Nm"] == pytest.approx(5 * 0.5)
     assert told["carried_kg"] == pytest.approx(0.6)
     assert told["spilled_kg"] == pytest.approx(0.9 - 0.6)
     assert told["carried_weight_N"] == pytest.approx((4.0 + 6.0 + 5.0) / 3.0)

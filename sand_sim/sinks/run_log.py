@@ -199,13 +199,15 @@ class RunLog:
 def _summarise_tool(columns: dict[str, np.ndarray], tool: Tool) -> dict:
     """Peaks of the forces, and where the trajectory has a phase ``carry`` the masses carried and spilled in it.
 
-    Draft is the force against the tool's horizontal motion, lift the downward force of the sand that lifting has to overcome.
+    Draft is the force against the tool's horizontal motion, lift the downward force of the sand that lifting has to overcome;
+    torque is about the origin of the tool's frame.
     """
     force, velocity = columns[f"{tool.name}.force"], columns[f"{tool.name}.velocity"]
     carried, time = columns[f"{tool.name}.carried"], columns["time"]
     speed = np.linalg.norm(velocity[:, :2], axis=1)
     draft = -np.sum(force[:, :2] * velocity[:, :2], axis=1) / np.maximum(speed, _STILL)
     summary = {"peak_draft_N": draft.max(initial=0.0) + 0.0, "peak_lift_N": (-force[:, 2]).max(initial=0.0) + 0.0}
+    summary["peak_torque_Nm"] = np.linalg.norm(columns[f"{tool.name}.torque"], axis=1).max(initial=0.0)
     begin, end = phases_of(tool.trajectory).get("carry", (np.inf, np.inf))
     during = np.flatnonzero((time >= begin) & (time <= end))
     if len(during):
