@@ -15,7 +15,7 @@ from sampler.skin import Skin
 _WATCHED = 0.15  # places that were found so near to being a gap are looked at the next time, too, in spacings
 _PORTION = 500_000  # random places that are thrown at a time
 _STEPS = 8, 4  # from the worst places known to the worst ones near by, and trials for each
-CLOSE_STEPS = 16, 8  # those of who wants to be sure
+CLOSE_STEPS = 16, 8  # the same where the worst must not be missed: before particles are accepted, and when they are measured
 _GAP = 0.785, 0.965  # a place farther from all particles, or from those of its own skin, is a gap; in spacings
 _GRAVE, _WEIGHT = (0.785, 0.99), 4.0  # and from these ways on a grave one; that, and loneliness, counts so much more
 _GAPS_APART = 1.2  # gaps nearer than this to a deeper one wait, in spacings
