@@ -286,6 +286,22 @@ def test_a_history_stays_within_its_bound(tmp_path):
     assert len(resumed.rows) < len(steps) + 3
 
 
+def test_peaks_are_of_all_frames_also_of_those_that_are_given_up(tmp_path):
+    world = World(load_scene(write_small_scene(tmp_path)))
+    log, first = RunLog(world.scene, most_rows=4), world.observe()
+    for k in range(100):
+        pull = np.array([0.0, -7.0, -5.0] if k == 41 else [0.0, 3.0, 1.0])
+        tool = replace(first.tools[0], velocity=np.array([0.0, 0.2, 0.0]), world_force=pull, torque=pull)
+        log.write(replace(first, steps=k, tools=(tool,)))
+    resumed = RunLog(world.scene, most_rows=4)
+    resumed.unpack(log.pack())
+    resumed.write(replace(first, steps=100))
+    for one in (log, resumed):
+        assert 41 not in one.columns()["steps"]
+        (told,) = one.summarise()["tools"].values()
+        assert (told["peak_draft_N"], told["peak_lift_N"], told["peak_torque_Nm"]) == pytest.approx((7.0, 5.0, 74**0.5))
+
+
 def test_a_file_of_an_earlier_run_stays_whole_where_a_new_one_cannot_be_written(world, tmp_path, monkeypatch):
     def write_half(path, **arrays):
         Path(path).write_bytes(b"half")

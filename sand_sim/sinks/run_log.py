@@ -8,7 +8,7 @@ from uuid import uuid4
 
 import numpy as np
 
-from sand_sim.border import Observation
+from sand_sim.border import Observation, ToolReport
 from sand_sim.scene.types import Scene, Tool
 from sand_sim.track import phases_at, phases_of
 
@@ -17,6 +17,7 @@ _STILL = 1e-4  # [m/s] horizontal speed below which a tool has no draft
 _OF_HEALTH = ("contacts", "deepest", "kinetic", "dissipated", "momentum_residual")
 _OF_TOOL = {name: name for name in ("position", "orientation", "velocity", "torque", "carried")} | {"force": "world_force"}
 _OF_PLUNGER = ("position", "force")
+_LOADS = ("draft_N", "lift_N", "torque_Nm")  # of which a tool's peaks are kept
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,7 @@ class RunLog:
         fault: why the run stopped before its end, empty if it did not.
         interrupted: whether the user stopped it.
         identity: the same before and after a run has been resumed.
+        peaks: largest values of all frames by name, also of those that are given up.
         most_rows: how many are kept; beyond, every other one is given up, and from then on every other frame is written.
     """
 
@@ -77,6 +79,7 @@ class RunLog:
     fault: str = ""
     interrupted: bool = False
     identity: str = field(default_factory=lambda: uuid4().hex)
+    peaks: dict[str, float] = field(default_factory=dict)
     most_rows: int = 2**31
     _every: int = 1
     _frames: int = 0
@@ -90,6 +93,10 @@ class RunLog:
         self._steps = observation.steps
         for phase in phases_at(self.scene, observation.time):
             self.views[phase] = View.of(observation)
+        seen = {"momentum_residual": health.momentum_residual}
+        for tool in observation.tools:
+            seen |= {f"{tool.name}.{name}": value for name, value in _loads_of(tool).items()}
+        self.peaks |= {name: max(self.peaks.get(name, 0.0), float(value)) for name, value in seen.items()}  # past NaN
         number, self._frames = self._frames, self._frames + 1
         if number % self._every:
             return
@@ -112,6 +119,11 @@ class RunLog:
         return names | {f"wall.{name}.{part}" for name in self._plungers for part in _OF_PLUNGER}
 
     @property
+    def _peaks(self) -> set[str]:
+        """Of all peaks."""
+        return {"momentum_residual"} | {f"{tool.name}.{name}" for tool in self.scene.tools for name in _LOADS}
+
+    @property
     def _plungers(self) -> set[str]:
         return {boundary.name for boundary in self.scene.boundaries if boundary.drive}
 
@@ -129,6 +141,7 @@ class RunLog:
         views = {phase: vars(view).items() for phase, view in self.views.items()}
         packed = {"identity": np.array(self.identity), "thinned": np.array([self._every, self._frames, self._steps])}
         packed |= {f"row/{name}": column for name, column in self.columns().items()}
+        packed |= {f"peak/{name}": np.array(value) for name, value in self.peaks.items()}
         return packed | {f"view/{phase}/{name}": array for phase, items in views.items() for name, array in items}
 
     def unpack(self, packed: dict[str, np.ndarray]) -> None:
@@ -137,19 +150,22 @@ class RunLog:
         Raises:
             ValueError: if that was another run's.
         """
-        columns, views = {}, {}
+        columns, peaks, views = {}, {}, {}
         for name, array in packed.items():
             kind, _, name_there = name.partition("/")
             if kind == "row":
                 columns[name_there] = array
+            elif kind == "peak":
+                peaks[name_there] = array
             elif kind == "view":
                 phase, _, part = name_there.rpartition("/")
                 views.setdefault(phase, {})[part] = array
-        if packed and columns.keys() != self._names:
+        if packed and (columns.keys() != self._names or peaks.keys() != self._peaks):
             raise ValueError("history: not of this scene")
         try:
             rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
             views = {phase: View(**parts) for phase, parts in views.items()}
+            peaks = {name: float(peak) for name, peak in peaks.items()}
             wall = float(rows[-1]["wall"]) if rows else 0.0
             every, frames, steps = (int(number) for number in packed.get("thinned", (1, 0, -1)))
         except TypeError as error:
@@ -157,7 +173,7 @@ class RunLog:
         if every < 1:
             raise ValueError(f"history: every {every}th frame")
         self.rows, self.views, self.started = rows, views, time.monotonic() - wall
-        self._every, self._frames, self._steps = every, frames, steps
+        self.peaks, self._every, self._frames, self._steps = peaks, every, frames, steps
         self.identity = str(packed.get("identity", self.identity))
 
     def summarise(self) -> dict:
@@ -178,11 +194,11 @@ class RunLog:
             "wall_s": columns["wall"][-1],
             "real_time_factor": self.real_time_factor,
             "contacts": health.contacts,
-            "largest_momentum_residual": np.nanmax(columns["momentum_residual"], initial=0.0),
+            "largest_momentum_residual": self.peaks["momentum_residual"],
             "largest_overlap_over_radius": health.deepest,
             "energy_J": energies,
             "doubts": [*health.doubts, *([self.fault] if self.fault else [])],
-            "tools": {tool.name: _summarise_tool(columns, tool) for tool in self.scene.tools},
+            "tools": {tool.name: _summarise_tool(columns, tool, self.peaks) for tool in self.scene.tools},
         }
         return json.loads(json.dumps(summary, default=float))
 
@@ -196,18 +212,21 @@ class RunLog:
         path.write_text(json.dumps(self.summarise() | origin, indent=2) + "\n")
 
 
-def _summarise_tool(columns: dict[str, np.ndarray], tool: Tool) -> dict:
-    """Peaks of the forces, and where the trajectory has a phase ``carry`` the masses carried and spilled in it.
+def _loads_of(tool: ToolReport) -> dict[str, float]:
+    """What a tool bears now.
 
-    Draft is the force against the tool's horizontal motion, lift the downward force of the sand that lifting has to overcome;
+    Draft is the force against its horizontal motion, lift the downward force of the sand that lifting has to overcome;
     torque is about the origin of the tool's frame.
     """
-    force, velocity = columns[f"{tool.name}.force"], columns[f"{tool.name}.velocity"]
-    carried, time = columns[f"{tool.name}.carried"], columns["time"]
-    speed = np.linalg.norm(velocity[:, :2], axis=1)
-    draft = -np.sum(force[:, :2] * velocity[:, :2], axis=1) / np.maximum(speed, _STILL)
-    summary = {"peak_draft_N": draft.max(initial=0.0) + 0.0, "peak_lift_N": (-force[:, 2]).max(initial=0.0) + 0.0}
-    summary["peak_torque_Nm"] = np.linalg.norm(columns[f"{tool.name}.torque"], axis=1).max(initial=0.0)
+    along, force = tool.velocity[:2], tool.world_force
+    draft = -float(force[:2] @ along) / max(float(np.linalg.norm(along)), _STILL)
+    return dict(zip(_LOADS, (draft, -float(force[2]), float(np.linalg.norm(tool.torque))), strict=True))
+
+
+def _summarise_tool(columns: dict[str, np.ndarray], tool: Tool, peaks: dict[str, float]) -> dict:
+    """Peaks of the loads, and where the trajectory has a phase ``carry`` the masses carried and spilled in it."""
+    force, carried, time = columns[f"{tool.name}.force"], columns[f"{tool.name}.carried"], columns["time"]
+    summary = {f"peak_{name}": peaks[f"{tool.name}.{name}"] for name in _LOADS}
     begin, end = phases_of(tool.trajectory).get("carry", (np.inf, np.inf))
     during = np.flatnonzero((time >= begin) & (time <= end))
     if len(during):
