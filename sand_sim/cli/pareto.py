@@ -11,15 +11,13 @@ import argparse
 import json
 from pathlib import Path
 
-import yaml
-
+from sand_sim.cli import changes
 from sand_sim.cli.console import Console
 from sand_sim.cli.numbers import count, positive
 from sand_sim.cli.writing import check_file, make_folder
 from sand_sim.config_folder import find_scene
 from sand_sim.interruption import InterruptedByUserError, Interruption
-from sand_sim.scene.reading import load_scene
-from sand_sim.scene.types import SceneError
+from sand_sim.scene.reading import load_scene, parse_scene
 from sand_sim.study.pareto import Plan, Study
 from sand_sim.study.quantity import QUANTITIES
 from sand_sim.study.ready import TOLERANCES, WHOLE, prepare
@@ -38,14 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--write", type=Path, metavar="FILE", help="write the scene, else unchanged, with what is recommended")
     parser.add_argument("--quick", action="store_true", help="fewer settings, of a shorter run where the scene is one of ours")
     parser.add_argument("--quantity", choices=QUANTITIES, help="what is compared; chosen from the scene if left out")
-    parser.add_argument(
-        "--set",
-        type=_edit,
-        action="append",
-        default=[],
-        metavar="PATH=VALUE",
-        help="change the scene before it is varied, as in --set duration=0.5 or --set 'fills.*.radius=0.004'; may be repeated",
-    )
+    changes.add_argument(parser, " before it is varied")
     parser.add_argument("--threads", type=count, help="cores to use; all if left out")
 
 
@@ -55,14 +46,14 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     scene = load_scene(path)
     make_folder(options.out)
     check_file(options.write, "--write")
-    whole = yaml.safe_load(path.read_text(encoding="utf-8"))
+    whole = parse_scene(path)
     facts = Facts.of(scene)
     preparation = prepare(path, scene, facts.grains, options.quantity)
     shortenings = [preparation.shortening] + ([preparation.quick] if options.quick else [])
     threads = (Edit("solver.threads", to(options.threads)),) if options.threads else ()
     varied = whole
     for shortening in (*shortenings, Variation("", "", (*options.set, *threads))):
-        varied = _apply(shortening, varied, facts)
+        varied = changes.apply_edits(shortening, varied, facts)
     tolerance = options.tolerance or TOLERANCES[preparation.quantity]
     variations = tuple(one for one in preparation.variations if one.quick or not options.quick)
     plan = Plan(preparation.quantity, tolerance, options.repeats or (2 if options.quick else preparation.repeats), variations)
@@ -84,7 +75,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     for file in _write(study, scene.name, chosen, notes, options.out):
         print(f"written: {file}")
     if options.write and chosen:
-        kept = write_scene(path, _apply(chosen[0], whole, facts), options.write)
+        kept = write_scene(path, changes.apply_edits(chosen[0], whole, facts), options.write)
         load_scene(options.write)
         print(f"written: {options.write}" + ("" if kept else ", without the comments of the original"))
     elif options.write:
@@ -136,21 +127,3 @@ def _write(study: Study, name: str, chosen: tuple | None, notes: list[str], fold
     except ModuleNotFoundError:
         pass  # matplotlib is an extra; the JSON holds all that the figure shows
     return files
-
-
-def _apply(variation: Variation, parsed: dict, facts: Facts) -> dict:
-    try:
-        return variation.apply(parsed, facts)
-    except (KeyError, ValueError, TypeError, AttributeError) as error:
-        paths = ", ".join(edit.path for edit in variation.edits)
-        raise SceneError(f"cannot change {paths} in this scene: {error!r}") from None
-
-
-def _edit(text: str) -> Edit:
-    path, sign, value = text.partition("=")
-    if not sign or not path or not value:
-        raise argparse.ArgumentTypeError(f"must be PATH=VALUE, got '{text}'")
-    try:
-        return Edit(path, to(yaml.safe_load(value)))
-    except yaml.YAMLError:
-        raise argparse.ArgumentTypeError(f"must be PATH=VALUE with a value as in a scene file, got '{text}'") from None

@@ -5,11 +5,11 @@ import json
 from dataclasses import asdict
 
 from sand_sim.assemble import assemble
+from sand_sim.cli import changes
 from sand_sim.cli.console import Console
 from sand_sim.config_folder import find_scene
 from sand_sim.interruption import Interruption
 from sand_sim.plan import Plan, make_plan
-from sand_sim.scene.reading import load_scene
 from sand_sim.scene.types import ROUGH, SMOOTH
 
 _TOUCHED = {ROUGH: "rough: particles of its mesh", SMOOTH: "smooth: the true surface of its mesh"}
@@ -18,6 +18,7 @@ _TOUCHED = {ROUGH: "rough: particles of its mesh", SMOOTH: "smooth: the true sur
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("scene", help="scene file, or the name of one of the package's own, such as dig")
+    changes.add_argument(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument("--no-measure", action="store_true", help="do not run a sample to predict the cost")
 
@@ -30,7 +31,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
         interruption.check()
         console.stage(stage, share)
 
-    assembly = assemble(load_scene(find_scene(options.scene)), progress)
+    assembly = assemble(changes.load_changed(find_scene(options.scene), options.set), progress)
     plan = make_plan(assembly, measure=not options.no_measure, check=interruption.check)
     console.end()
     print(json.dumps(asdict(plan), indent=2, default=float) if options.json else plan_text(plan))

@@ -9,6 +9,7 @@ from pathlib import Path
 from sand_sim.border import CommandError
 from sand_sim.checkpoint import CheckpointError, take_checkpoint
 from sand_sim.checkpoints import PERIOD, CheckpointFolder
+from sand_sim.cli import changes
 from sand_sim.cli.console import Console
 from sand_sim.cli.numbers import count, positive
 from sand_sim.cli.writing import make_folder
@@ -17,7 +18,6 @@ from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.interruption import Interruption
 from sand_sim.playing import commands_at, frame_times
 from sand_sim.report import progress_line, summary_text
-from sand_sim.scene.reading import load_scene
 from sand_sim.sinks.recorder import Recorder, RecordingError, require_rerun
 from sand_sim.sinks.run_log import RunLog
 from sand_sim.world import World
@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("scene", help="scene file, or the name of one of the package's own, such as dig")
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for recording, history, summary and figure")
+    changes.add_argument(parser)
     parser.add_argument("--duration", type=positive, help="simulated seconds; the scene's own if left out")
     parser.add_argument("--threads", type=count, help="cores to use; all if left out")
     parser.add_argument("--checkpoint", type=Path, metavar="FOLDER", help="keep the state there, so that a crash loses little")
@@ -39,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     """Run the verb."""
     console = Console()
-    scene = load_scene(find_scene(options.scene))
+    scene = changes.load_changed(find_scene(options.scene), options.set)
     make_folder(options.out)
     if options.threads:
         scene = replace(scene, solver=replace(scene.solver, threads=options.threads))

@@ -62,17 +62,26 @@ def load_scene(path: str | Path) -> Scene:
         SceneError: if the file cannot be read or a field is wrong; the message names the field and how to mend it.
     """
     path = Path(path)
+    parsed = parse_scene(path)
     try:
-        parsed = yaml.load(path.read_text(encoding="utf-8"), _Loader)
+        return read_scene(parsed, path.resolve().parent, path.stem)
+    except SceneError as error:
+        raise SceneError(f"{path}: {error}") from None
+
+
+def parse_scene(path: Path) -> Any:
+    """The content of a scene file, as YAML gives it.
+
+    Raises:
+        SceneError: if it cannot be read.
+    """
+    try:
+        return yaml.load(path.read_text(encoding="utf-8"), _Loader)
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     except (yaml.YAMLError, ValueError, AttributeError, RecursionError) as error:  # of dates, long numbers, deep nests, too
         told = " ".join(str(error).split()).replace('in "<unicode string>", ', "in ")  # the file is named before it
         raise SceneError(f"{path}: is not valid YAML: {told}") from None
-    try:
-        return read_scene(parsed, path.resolve().parent, path.stem)
-    except SceneError as error:
-        raise SceneError(f"{path}: {error}") from None
 
 
 def read_scene(parsed: dict, folder: Path, name: str = "scene") -> Scene:

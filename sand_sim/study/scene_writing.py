@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 
 # Entries that may be paths, by the sections they are in.
-_PATHS = {
+PATHS = {
     "fills": ("file", "shape"),
     "boundaries": ("mesh", "heights"),
     "tools": ("mesh", "urdf"),
@@ -54,7 +54,7 @@ def change_text(text: str, edited: dict) -> str:
 def _moved(parsed: dict, old: Path, new: Path) -> dict:
     """The scene with its relative paths starting at another folder."""
     moved = deepcopy(parsed)
-    for section, keys in _PATHS.items():
+    for section, keys in PATHS.items():
         entries = moved.get(section) or ()
         for entry in entries.values() if isinstance(entries, dict) else entries:
             for key in keys:
