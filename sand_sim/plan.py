@@ -32,6 +32,7 @@ class Plan:
         grains, spheres: numbers.
         kept: stages with when they run.
         tools, terrains: by name, whether grains touch their particles (``rough``) or their true surfaces (``smooth``).
+        boxes: lowest and highest corner of each tool's mesh in the tool's frame [m].
         meshes: what the sampler had to mend or guess in the meshes of tools, terrains and bodies, where it had to.
         unused: what the scene gives for contact laws that it has not chosen.
         odd: numbers that are more likely in another unit.
@@ -50,6 +51,7 @@ class Plan:
     kept: dict[str, str]
     tools: dict[str, str]
     terrains: dict[str, str]
+    boxes: dict[str, list[list[float]]]
     meshes: dict[str, tuple[str, ...]]
     unused: list[str]
     odd: list[str]
@@ -86,6 +88,7 @@ def make_plan(assembly: Assembly, measure: bool = True, check: Callable[[], None
         kept=kept,
         tools={tool.name: tool.contact for tool in scene.tools},
         terrains={wall.name: wall.terrain.contact for wall in scene.boundaries if wall.terrain},
+        boxes={tool.tool.name: tool.mesh.bounds.tolist() for tool in assembly.tools},
         meshes=assembly.mesh_warnings,
         unused=unused_numbers(scene),
         odd=odd_numbers(scene),

@@ -51,6 +51,9 @@ def summary_text(summary: dict) -> str:
     if summary["interrupted"]:
         rows.insert(3, ("interrupted", "by the user, before its end"))
     for name, tool in summary["tools"].items():
+        if not tool["peak_force_N"]:
+            rows.append((name, "has met no grain; `sand_sim plan` tells where its mesh lies in its frame"))
+            continue
         rows.append((f"{name}: peak draft", f"{tool['peak_draft_N']:.1f} N"))
         rows.append((f"{name}: peak lift", f"{tool['peak_lift_N']:.1f} N"))
         rows.append((f"{name}: peak torque", f"{tool['peak_torque_Nm']:.3g} N m"))

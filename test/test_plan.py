@@ -112,6 +112,8 @@ def test_smooth_tools_are_left_out_where_all_are_rough(tmp_path):
     assert "true surfaces of tools" not in smooth.left_out
     assert rough.tools == {"plate": "rough"}
     assert smooth.tools == {"plate": "smooth"}
+    assert rough.boxes == smooth.boxes
+    np.testing.assert_allclose(rough.boxes["plate"], [[-0.03, -0.03, -0.002], [0.03, 0.03, 0.002]], atol=1e-8)
     assert (rough.terrains, smooth.terrains) == ({}, {"ground": "smooth"})
 
 
@@ -130,7 +132,7 @@ def test_verb_prints_text_and_json(tmp_path, capsys):
     path = write_small_scene(tmp_path)
     assert main(["plan", str(path), "--no-measure"]) == 0
     text = capsys.readouterr().out
-    for word in ("stages kept", "left out", "bytes per sphere", "kernels", "time step"):
+    for word in ("stages kept", "left out", "bytes per sphere", "kernels", "time step", "plate  ", "to (0.03, 0.03, 0.002) m"):
         assert word in text
     assert main(["plan", str(path), "--json"]) == 0
     plan = json.loads(capsys.readouterr().out)

@@ -7,6 +7,7 @@ import pytest
 from scenes import write_small_scene
 
 from sand_sim import World, load_scene
+from sand_sim.report import summary_text
 from sand_sim.sinks.run_log import RunLog
 
 
@@ -28,9 +29,21 @@ def test_draft_is_against_the_motion_lift_is_down_and_what_is_lost_is_spilled(tm
         report = replace(first.tools[0], velocity=np.array(velocity), carried=mass, **felt)
         log.write(replace(first, time=time, steps=number, tools=(report,)))
     told = log.summarise()["tools"]["plate"]
+    assert told["peak_force_N"] == pytest.approx(50.16, abs=0.01)
     assert told["peak_draft_N"] == pytest.approx(5.0)
     assert told["peak_lift_N"] == pytest.approx(6.0)
     assert told["peak_torque_Nm"] == pytest.approx(5 * 0.5)
     assert told["carried_kg"] == pytest.approx(0.6)
     assert told["spilled_kg"] == pytest.approx(0.9 - 0.6)
     assert told["carried_weight_N"] == pytest.approx((4.0 + 6.0 + 5.0) / 3.0)
+
+
+@pytest.mark.parametrize("pull", [0.0, 2.0])
+def test_a_tool_that_met_no_grain_is_told(tmp_path, pull):
+    """As where a mesh of one's own lies elsewhere in its frame than was thought."""
+    world = World(load_scene(write_small_scene(tmp_path)))
+    first, log = world.observe(), RunLog(world.scene)
+    log.write(replace(first, steps=1, tools=(replace(first.tools[0], world_force=np.array([0.0, 0.0, pull])),)))
+    log.write(replace(first, steps=2))
+    text = summary_text(log.summarise())
+    assert ("plate  " in text, "met no grain" in text, "plate: peak lift" in text) == (not pull, not pull, bool(pull))

@@ -45,6 +45,8 @@ def plan_text(plan: Plan) -> str:
     for kind, touched in (("tools", plan.tools), ("terrains", plan.terrains)):
         lines += ["", f"{kind}: what grains touch"] if touched else []
         lines += [f"  {name:32} {_TOUCHED[contact]}" for name, contact in touched.items()]
+    lines += ["", "tools: where their meshes lie in their frames"] if plan.boxes else []
+    lines += [f"  {name:32} from ({_corner(low)}) to ({_corner(high)}) m" for name, (low, high) in plan.boxes.items()]
     lines += ["", "meshes: what had to be mended or guessed"] if plan.meshes else []
     lines += [f"  {name:32} {what}" for name, told in plan.meshes.items() for what in told]
     lines += ["", "without effect", *(f"  {what}" for what in plan.unused)] if plan.unused else []
@@ -64,3 +66,7 @@ def plan_text(plan: Plan) -> str:
     if plan.sphere_step is not None:
         lines[-1] += f" at {1e9 * plan.sphere_step:.0f} ns per sphere and step on this machine, about {plan.duration:,.0f} s"
     return "\n".join(lines)
+
+
+def _corner(place: list[float]) -> str:
+    return ", ".join(f"{value:.3g}" for value in place)

@@ -17,7 +17,7 @@ _STILL = 1e-4  # [m/s] horizontal speed below which a tool has no draft
 _OF_HEALTH = ("contacts", "deepest", "kinetic", "dissipated", "momentum_residual")
 _OF_TOOL = {name: name for name in ("position", "orientation", "velocity", "torque", "carried")} | {"force": "world_force"}
 _OF_PLUNGER = ("position", "force")
-_LOADS = ("draft_N", "lift_N", "torque_Nm")  # of which a tool's peaks are kept
+_LOADS = ("force_N", "draft_N", "lift_N", "torque_Nm")  # of which a tool's peaks are kept
 
 
 @dataclass(frozen=True)
@@ -219,8 +219,9 @@ def _loads_of(tool: ToolReport) -> dict[str, float]:
     torque is about the origin of the tool's frame.
     """
     along, force = tool.velocity[:2], tool.world_force
-    draft = -float(force[:2] @ along) / max(float(np.linalg.norm(along)), _STILL)
-    return dict(zip(_LOADS, (draft, -float(force[2]), float(np.linalg.norm(tool.torque))), strict=True))
+    draft = -force[:2] @ along / max(np.linalg.norm(along), _STILL)
+    loads = np.linalg.norm(force), draft, -force[2], np.linalg.norm(tool.torque)
+    return dict(zip(_LOADS, map(float, loads), strict=True))
 
 
 def _summarise_tool(columns: dict[str, np.ndarray], tool: Tool, peaks: dict[str, float]) -> dict:
