@@ -94,8 +94,11 @@ class Connections:
             self._undo.pop()()
 
     def _rest(self) -> None:
-        """Let messages gather, so that bringing a few takes no more than a ninth of a core from the threads that step."""
-        if not self._in_haste():
+        """Let messages gather, so that bringing a few takes no more than a ninth of a core from the threads that step.
+
+        Not where the executor has other nodes, too: they would have to wait.
+        """
+        if not self._in_haste() and len(self._node.executor.get_nodes()) == 1:
             spent = max(0.0, time.thread_time() - self._spent)  # the thread need not be the one that made the connections
             time.sleep(min(_RESTS * spent, _LONGEST_REST))
         self._spent = time.thread_time()

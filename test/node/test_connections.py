@@ -70,6 +70,16 @@ def test_no_rest_where_each_message_counts(chatter):
     assert (len(one.heard), one.rests) == (1, [])
 
 
+def test_no_rest_where_other_nodes_would_have_to_wait(chatter):
+    one = chatter(in_haste=False)
+    other = rclpy.create_node("other")
+    one.executor.add_node(other)
+    one.say(1)
+    one.listen(1)
+    other.destroy_node()
+    assert (len(one.heard), one.rests) == (1, [])
+
+
 def test_no_rest_after_many_messages(chatter):
     one = chatter(in_haste=False)
     one.say(50)
