@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rosgraph_msgs.msg import Clock
 
 from msg_adapters import simulation_interfaces, tf2_msgs
@@ -25,6 +25,7 @@ from sand_sim.node.change_services import ChangeServices
 from sand_sim.node.connections import Connections
 from sand_sim.node.diagnosis import Diagnosis
 from sand_sim.node.graph_watch import GraphWatch
+from sand_sim.node.managed_node import ManagedNode
 from sand_sim.node.parameters import Parameters, tool_declarations
 from sand_sim.node.robot import read_robot
 from sand_sim.node.run_files import RunFiles
@@ -43,7 +44,7 @@ _PROGRESS_PERIOD = 5.0  # [s] wall
 _DONE, _REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
-class SandSimNode(LifecycleNode):
+class SandSimNode(ManagedNode):
     """Hosts a world while it is configured; the world moves while the node is active.
 
     Args:
@@ -120,17 +121,6 @@ class SandSimNode(LifecycleNode):
         self._tear_down()
         self.done = True
         return _DONE
-
-    def _LifecycleNodeMixin__on_change_state(self, request, response):  # noqa: N802
-        """Refuse a transition that is not possible now, where rclpy raises in its service and so ends the node."""
-        asked, machine = request.transition, self._state_machine
-        possible = {number: label for number, label, *_ in machine.available_transitions}
-        if (asked.label or possible.get(asked.id)) not in possible.values():
-            name = asked.label or dict(edge[:2] for edge in machine.transition_graph).get(asked.id, asked.id)
-            self.get_logger().warning(f"transition '{name}' is not possible now; possible are {', '.join(possible.values())}")
-            response.success = False
-            return response
-        return super()._LifecycleNodeMixin__on_change_state(request, response)
 
     def destroy_node(self) -> None:
         """Finish all files, then go."""
@@ -238,12 +228,12 @@ class SandSimNode(LifecycleNode):
         self._bed = BedOutputs(connections, parameters, world, self._complain)
         self._endings.callback(self._bed.close)
         inputs = ToolInputs(connections, parameters, self.simulation, lambda: self._active, frames, lambda: self._last)
-        services = Services(self, connections, self.simulation, self.hold)
-        ChangeServices(connections, services, self.simulation, Path(expanduser(parameters["states"])))
+        self.answering = Services(self, connections, self.simulation, self.hold)
+        ChangeServices(connections, self.answering, self.simulation, Path(expanduser(parameters["states"])))
         if simulation_interfaces.srv is None:
             self.get_logger().info("simulation_interfaces is not installed: its services are absent", once=True)
         else:
-            SimulationServices(self, connections, services, self.simulation, inputs.frames, lambda: self._last)
+            SimulationServices(self, connections, self.answering, self.simulation, inputs.frames, lambda: self._last)
         name = self.get_fully_qualified_name().lstrip("/")
         self._diagnosis = Diagnosis(self.simulation, name, self.get_logger().warning)
         self._watch = GraphWatch(self, parameters, [tool.name for tool in world.scene.tools])
@@ -254,7 +244,7 @@ class SandSimNode(LifecycleNode):
         self._active = self.configured = False
         self._endings.close()
         # The node may go on for long: what it still held would keep the world's memory and its threads.
-        self.simulation = self.recorder = self._last = self._diagnosed = None
+        self.simulation = self.recorder = self.answering = self._last = self._diagnosed = None
         self._tools, self._bed, self._diagnosis, self._watch = [], None, None, None
 
     def _finish_files(self) -> None:

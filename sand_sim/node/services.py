@@ -24,6 +24,7 @@ class Services:
 
     def __init__(self, node: Node, connections: Connections, simulation: Simulation, pause: Callable[[bool], None]):
         self._node, self._simulation, self._pause = node, simulation, pause
+        self._unanswered: set[Future] = set()
         connections.service(Trigger, "~/step", self._waiting(simulation.step))
         connections.service(Trigger, "~/reset", self._waiting(simulation.reset))
         connections.service(Trigger, "~/pause", self._holding(True))
@@ -53,17 +54,25 @@ class Services:
         if refusal := self._node.refusal:
             return False, refusal
         executor = self._node.executor
-        finished = Future(executor=executor)
+        finished, answered = Future(executor=executor), Future(executor=executor)
 
         def finish(done: concurrent.futures.Future) -> None:
             finished.set_result(_result(done))
             executor.wake()  # else it sees that only when it wakes for something else
 
         ask().add_done_callback(finish)
+        self._unanswered.add(answered)
         error, told = await finished
+        self._unanswered.discard(answered)
+        answered.set_result(None)
         if error is not None:
             return False, str(error)
         return True, told or f"t = {self._simulation.world.time:.6f} s"
+
+    async def quiet(self) -> None:
+        """Wait until all that has been asked for by now is answered."""
+        for answered in [*self._unanswered]:
+            await answered
 
 
 def _result(done: concurrent.futures.Future) -> tuple[Any, str]:

@@ -1,6 +1,7 @@
 """Lifecycle: configure, activate, deactivate, clean up, and whatever a client asks in the wrong moment."""
 
 import gc
+import threading
 import time
 import weakref
 
@@ -101,6 +102,24 @@ def test_impossible_transitions_are_refused(client, start_node):
     for label in ("configure", "explode"):
         told = f"transition '{label}' is not possible now; possible are deactivate, shutdown"
         client.wait_for(lambda: told in heard)  # noqa: B023
+
+
+@pytest.mark.parametrize("transition", ["deactivate", "active_shutdown"])
+def test_what_was_asked_before_a_transition_is_answered_before_its_service_goes(client, start_node, transition):
+    node = start_node(pacing="lockstep")
+    go_on = threading.Event()
+    node.simulation.request(go_on.wait)  # as a frame that takes long
+    step = client.ask(Trigger, "step")
+    client.wait_for(lambda: node.simulation._step in [act for act, _ in node.simulation._requests])
+    number = getattr(Transition, f"TRANSITION_{transition.upper()}")
+    transit = client.ask(ChangeState, "change_state", ChangeState.Request(transition=Transition(id=number)))
+    threading.Timer(0.5, go_on.set).start()
+    client.wait_for(transit.done)
+    assert transit.result().success
+    if transition == "deactivate":
+        assert change(client, "cleanup")
+    client.wait_for(step.done, patience=10.0)
+    assert step.result().success
 
 
 def test_frames_that_have_changed_are_looked_at_again(client, start_node):

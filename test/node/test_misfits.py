@@ -138,7 +138,7 @@ def test_dumped_parameters_can_be_read_again(ros, start_node, tmp_path):
 def test_an_answer_does_not_wait_for_the_executor_to_wake(ros):
     """Else each step by service takes as long as the executor's longest nap."""
     executor, asked = SingleThreadedExecutor(), Future()
-    services = SimpleNamespace(_node=SimpleNamespace(refusal="", executor=executor))
+    services = SimpleNamespace(_node=SimpleNamespace(refusal="", executor=executor), _unanswered=set())
     task = executor.create_task(Services.outcome(services, lambda: asked))
     executor.spin_once(timeout_sec=0.0)
     threading.Timer(0.2, lambda: asked.set_result("done")).start()

@@ -50,10 +50,13 @@ class Client:
     def send(self, position, at=None, frame="world", orientation=NO_TURN):
         self.poses.publish(command_to_pose(ToolPose("plate", np.asarray(position, float), orientation, at), frame))
 
-    def call(self, kind, name, request=None):
+    def ask(self, kind, name, request=None):
         client = self.node.create_client(kind, f"/sand_sim/{name}")
         self.wait_for(client.service_is_ready)
-        future = client.call_async(request or kind.Request())
+        return client.call_async(request or kind.Request())
+
+    def call(self, kind, name, request=None):
+        future = self.ask(kind, name, request)
         self.wait_for(future.done)
         return future.result()
 
