@@ -282,12 +282,15 @@ class SandSimNode(ManagedNode):
             self._frames.publish(tf2_msgs.frames_to_message(frames))
 
     def _complain(self, error: Exception) -> None:
-        self.get_logger().error(f"a cloud could not be told: {error}", throttle_duration_sec=10.0)
+        if self.context.ok():
+            self.get_logger().error(f"a cloud could not be told: {error}", throttle_duration_sec=10.0)
 
     def _fail(self, error: Exception) -> None:
         """Called in the stepping thread; the world is back in its last good state."""
         if isinstance(error, UnstableError):
             self._last = self.simulation.world.observe()
+        elif not self.context.ok():
+            return  # whoever hosts the node has shut ROS down: nobody hears any more, and the run is none the worse
         self.recorder.log.fault = str(error)
         self.get_logger().error(f"stepping has stopped: {error}")
         self.done = self.done or self.parameters["end_on_fault"]
