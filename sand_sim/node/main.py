@@ -45,7 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
         interruption.check()
         if strange := remove_ros_args(sys.argv if arguments is None else arguments)[1:]:
             return _explain(strange)
-        node = SandSimNode(progress=Preparation(interruption.check, rclpy.logging.get_logger("sand_sim").info))
+        node = SandSimNode(progress=Preparation(interruption.check, lambda line: node.get_logger().info(line)))
         executor.add_node(node)
         if node.parameters["autostart"]:
             node.start()

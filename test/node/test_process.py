@@ -102,6 +102,17 @@ def test_nothing_is_left_behind(start_process, tmp_path, ready):
     assert (ours - others) & set(os.listdir("/dev/shm")) == set(), "some files serve all processes of a machine"
 
 
+def test_progress_is_told_by_the_name_that_the_node_has(tmp_path):
+    scene = write_small_scene(tmp_path, settle={"time": 1000.0, "speed": 1e-9})
+    words = ["-r", "__node:=second", "-r", "__ns:=/left", "-p", f"scene:={scene}"]
+    command = [sys.executable, "-m", "sand_sim.node", "--ros-args", *words]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        line = next(line for line in process.stderr if "settling, " in line)
+        process.send_signal(signal.SIGINT)
+    assert "[left.second]: settling" in line
+    assert process.returncode == 0
+
+
 def test_the_node_can_end_when_a_run_blows_up(start_process, tmp_path):
     write_small_scene(tmp_path, solver={"time_step": 9e-4, "force_time_step": True})
     process = start_process(scene="small.yaml", pacing="fast", end_on_fault=True, output=tmp_path / "out")
