@@ -155,8 +155,8 @@ class SandSimNode(ManagedNode):
 
     def _configure(self) -> None:
         parameters = self.parameters
-        if unsaid := parameters.unsaid():
-            self.get_logger().warning(unsaid)
+        for warning in filter(None, (parameters.unsaid(), parameters.unfollowed())):
+            self.get_logger().warning(warning)
         scene = load_scene(find_scene(parameters["scene"]))
         if parameters["threads"]:
             scene = replace(scene, solver=replace(scene.solver, threads=parameters["threads"]))

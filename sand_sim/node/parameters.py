@@ -154,6 +154,12 @@ class Parameters(Mapping):
             f"under '{name}' or '/**'"
         )
 
+    def unfollowed(self) -> str:
+        """What to say where others tell the time, which the node cannot follow; or empty."""
+        if self._values["publish_clock"] or not self._node.get_parameter("use_sim_time").value:
+            return ""
+        return "use_sim_time: the node follows no other /clock; its stamps are of its own simulated time, which begins at zero"
+
     def misspelt(self) -> dict[str, str]:
         """Parameters that were given but that nobody has declared, and the most similar of those declared, or ''."""
         known = [*self._values, *_OF_ROS]

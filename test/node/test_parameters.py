@@ -116,6 +116,15 @@ def test_parameters_that_nobody_declares_are_named(client, start_node):
     ]
 
 
+@pytest.mark.parametrize(("publish_clock", "warnings"), [(False, 1), (True, 0)])
+def test_a_clock_that_is_not_followed_is_told_of(client, start_node, publish_clock, warnings):
+    heard = []
+    client.node.create_subscription(Log, "/rosout", lambda log: heard.append(log.msg), LATCHED)
+    start_node(pacing="lockstep", use_sim_time=True, publish_clock=publish_clock)
+    client.wait_for(lambda: any("is ready" in message for message in heard))
+    assert len([message for message in heard if message.startswith("use_sim_time: the node follows no other /clock")]) == warnings
+
+
 def test_what_was_guessed_of_a_mesh_is_told(client, start_node, tmp_path):
     heard = []
     client.node.create_subscription(Log, "/rosout", lambda log: heard.append(log.msg), LATCHED)
