@@ -263,7 +263,9 @@ class SandSimNode(ManagedNode):
             self._told = time.monotonic()
             self.get_logger().info(progress_line(self.recorder.log))
         duration = self.parameters["duration"]
-        self.done = self.done or bool(duration and observation.time > duration - 0.5 * self.simulation.frame)
+        if duration and observation.time > duration - 0.5 * self.simulation.frame:
+            self.done = True
+            self.hold(True)  # else it goes on until the process ends, now so far and now so far
 
     def _publish_clock(self, observation: Observation) -> None:
         if self._clock_publisher:

@@ -162,6 +162,14 @@ def test_pausing_and_activity_both_hold(client, start_node):
     assert node.simulation.paused, "as it was before"
 
 
+def test_a_run_stops_at_its_duration(client, start_node):
+    """However long it takes until whoever runs the node ends it."""
+    node = start_node(pacing="fast", duration=0.1)
+    client.wait_for(lambda: node.done)
+    time.sleep(0.3)
+    assert node.simulation.world.time == pytest.approx(0.1, abs=1e-4)
+
+
 def test_a_destroyed_node_leaves_the_graph(client, tmp_path):
     """At once, not when garbage is collected: whoever asks by its name would be told of the one that is gone."""
     node = SandSimNode(parameter_overrides=[Parameter("scene", value=str(write_small_scene(tmp_path)))])
