@@ -161,11 +161,13 @@ class Parameters(Mapping):
         return "use_sim_time: the node follows no other /clock; its stamps are of its own simulated time, which begins at zero"
 
     def misspelt(self) -> dict[str, str]:
-        """Parameters that were given but that nobody has declared, and the most similar of those declared, or ''."""
+        """Parameters that were given but that nobody has declared, and the one that was meant or is missing, or ''."""
         known = [*self._values, *_OF_ROS]
         given = [name for name in self._node._parameter_overrides if not (name in known or self._node.has_parameter(name))]
         strange = [name for name in given if not name.startswith("qos_overrides.")]
-        return {name: next(iter(get_close_matches(name, known, 1)), "") for name in strange}
+        # A fixed frame has its parameters only if it is among those that are named.
+        other = {name: "frame_names" if name.startswith("frames.") else "" for name in strange}
+        return {name: next(iter(get_close_matches(name, known, 1)), other[name]) for name in strange}
 
     def __getitem__(self, name: str) -> Any:
         return self._values[name]

@@ -105,14 +105,16 @@ def test_parameters_that_nobody_declares_are_named(client, start_node):
     client.node.create_subscription(Log, "/rosout", lambda log: heard.append(log.msg), LATCHED)
     known = {"use_sim_time": False, "qos_overrides./sand_sim/points.publisher.reliability": "best_effort"}
     gone = {"qos_overrides./sand_sim/tools/spade/wrench.publisher.reliability": "best_effort"}  # of another scene's tool
-    misspelt = {"scene_file": "hopper", "tools.plaet.source": "twist", "zzz": 1}
+    misspelt = {"scene_file": "hopper", "tools.plaet.source": "twist", "zzz": 1, "frames.base.pose": [0.0] * 6}
     node = start_node(pacing="lockstep", **known, **gone, **misspelt)
-    assert node.parameters.misspelt() == {"scene_file": "scene", "tools.plaet.source": "tools.plate.source", "zzz": ""}
+    meant = {"scene_file": "scene", "tools.plaet.source": "tools.plate.source", "zzz": "", "frames.base.pose": "frame_names"}
+    assert node.parameters.misspelt() == meant
     client.wait_for(lambda: any("is ready" in message for message in heard))
     assert [message for message in heard if "there is no parameter" in message] == [
         "there is no parameter 'scene_file'; is 'scene' meant?",
         "there is no parameter 'tools.plaet.source'; is 'tools.plate.source' meant?",
         "there is no parameter 'zzz'",
+        "there is no parameter 'frames.base.pose'; is 'frame_names' meant?",
     ]
 
 
