@@ -20,6 +20,7 @@ _GAP = 0.785, 0.965  # a place farther from all particles, or from those of its 
 _GRAVE, _WEIGHT = (0.785, 0.99), 4.0  # and from these ways on a grave one; that, and loneliness, counts so much more
 _GAPS_APART = 1.2  # gaps nearer than this to a deeper one wait, in spacings
 _ROOM, _NEAR = 0.55, 0.4  # a gap is filled so far from particles of other skins, or as far as can be so near to it; in spacings
+_BEHIND = 0.1  # so near a particle of another skin is right behind a gap, and any place beside it is better
 _LEAST, _TOO_NEAR = 0.40, 0.37  # particles nearer than this to one another are a fault, and a grave one, in spacings
 _LONELY, _BESIDE = 1.09, (0.42, 1.06)  # those farther than this from all others get a neighbour, how far beside them; in spacings
 _MOVED, _TURNED = 1e-3, 0.999  # what has moved less, in spacings, and turned less, by the cosine, lies where it was
@@ -220,13 +221,14 @@ class Gaps:
         points, normals, free = self.places.points, self.places.normals, self.places.closest["way"]
         room, chosen, narrow = np.minimum(free, self.places.own["way"]), gaps.copy(), np.flatnonzero(free[gaps] < _ROOM)
         near = cells_around(self._grid, points[gaps[narrow]], _NEAR * self._unit)
-        roomy = np.flatnonzero((room > _LEAST) & near[self.places.cell])
-        around = points[roomy]
+        known = np.flatnonzero(near[self.places.cell])
+        around = points[known]
         for n in narrow:
-            near = roomy[within(around, points[gaps[n]], _NEAR * self._unit)]
+            near = known[within(around, points[gaps[n]], _NEAR * self._unit)]
             near = near[normals[near] @ normals[gaps[n]] > 0.5]
-            if len(near):
-                chosen[n] = near[room[near].argmax()]
+            best = near[room[near].argmax()] if len(near) else gaps[n]
+            if room[best] > _LEAST or free[gaps[n]] < _BEHIND:
+                chosen[n] = best
         return chosen
 
 

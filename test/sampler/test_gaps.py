@@ -88,6 +88,20 @@ def test_a_particle_alone_on_a_small_piece_gets_a_neighbour(radius):
     assert np.linalg.norm(verdict.points[0]) == pytest.approx(radius, abs=0.05)
 
 
+def test_a_gap_behind_which_a_particle_of_the_other_skin_lies_is_filled_beside_it():
+    """On a leaf without thickness, at the end of which one skin lacks a particle and the other has one."""
+    leaf = np.array(
+        [[[0.0, -0.01, 0.0], [1.1, -0.01, 0.0], [1.1, 0.01, 0.0]], [[0.0, -0.01, 0.0], [1.1, 0.01, 0.0], [0.0, 0.01, 0.0]]]
+    )
+    gaps = Gaps(Skin(np.concatenate([leaf, leaf[:, ::-1]])), 1.0)
+    points, up = np.array([[1.05, 0.0, 0.0], [0.0, 0.0, 0.0], [0.9, 0.0, 0.0]]), np.array([0.0, 0.0, 1.0])
+    gaps.look(points, np.array([up, -up, -up]))
+    gaps.scatter(500, np.random.default_rng(0), fixed=True)
+    verdict = gaps.judge(np.zeros(3, bool), np.random.default_rng(0))
+    assert len(verdict.points) == 1 and verdict.normals[0] == pytest.approx(up)
+    assert verdict.points[0][0] > 0.37
+
+
 @pytest.mark.parametrize("portion", [500_000, 700])
 def test_random_places_are_thrown_in_portions(monkeypatch, portion):
     monkeypatch.setattr("sampler.gaps._PORTION", portion)
