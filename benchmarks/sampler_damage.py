@@ -17,7 +17,7 @@ from benchmarks.provenance import provenance
 from sampler import MeshError, ParticleBody, SignedDistance, read_mesh, sample_body
 from sampler.quiet import start_warp
 
-ENDINGS = ".stl", ".obj", ".ply", ".dae"
+ENDINGS = ".stl", ".obj", ".ply", ".dae", ".glb"
 NODES, NEAR, SCATTER = 22, 3000, 5e-3  # of the grid along an axis, places near the surface, and how near, of the diagonal
 UNSURE = 1.1e-5  # of the diagonal: nearer to the surface a sign means nothing
 RADIUS, PARTICLES = 1e-3, 200  # of the body that tells the mass, of the diagonal
