@@ -15,7 +15,7 @@ from sampler.spreading_kernels import push_apart, throw_darts
 
 _SCATTERED = 12  # random places per wanted particle
 _HALVINGS = 7  # of the range in which the distance of the first placing is sought
-_TURNS, _REFILL_TURNS = 60, 10
+_TURNS, _REFILL_TURNS = 60, 30
 _FEW = (100, 8), (1000, 2)  # fewer particles turn so many times as often: more of them lie on rims and small pieces, or in rows
 _REFILLS = 16
 _SAMPLED = 40  # places per particle at which gaps are looked for, over the area; and as many over the edges
@@ -23,7 +23,7 @@ _CONFIRMED, _LOOKS = 60, 3  # and at fresh ones where hardly any is left, until 
 _HARDLY, _FINE = 1.0, 0.03  # sum of faults in spacings at which that is so, and at which all is well
 _STRENGTH = 0.25  # of a push, in spacings
 _CELL = 2.0  # width of the cells of the grid that particles are found with, in spacings
-_AROUND = 3.0  # distance from a filled gap or a removed particle within which others move, in spacings
+_AROUND = 2.0  # distance from a filled gap or a removed particle within which others move, in spacings; wider disturbs as much
 _SPARE, _MORE = 0.005, 0.009  # share of the particles kept back for gaps, and share that may be added above the wanted number
 _PATIENCE = 6  # refills without improvement after which the best is taken
 

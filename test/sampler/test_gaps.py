@@ -75,7 +75,7 @@ def test_the_worst_gap_is_found_from_few_places(seed):
     assert np.linalg.norm(verdict.points[0] - missing) < 0.03 * gaps.spacing
 
 
-@pytest.mark.parametrize("radius", [0.48, 0.9])
+@pytest.mark.parametrize("radius", [0.28, 0.48, 0.9])
 def test_a_particle_alone_on_a_small_piece_gets_a_neighbour(radius):
     """However small, if there is room on it for two; as far from it as the piece allows, and no farther than a spacing."""
     turn = np.linspace(0.0, 2.0 * np.pi, 65)
