@@ -116,6 +116,7 @@ def test_wrenches_of_a_turned_tool_are_in_the_axes_that_are_asked_for(client, st
     client.wait_for(lambda: client.node.count_publishers(f"{TOOL}/wrench_filtered"))
     press(client, rotation.from_rpy(np.pi, 0.0, 0.4))
     client.wait_for(lambda: all(heard and stamp_to_time(heard[-1].header.stamp) > 0.59 for heard in (client.wrenches, filtered)))
+    client.wait_for(lambda: node.recorder.log.rows[-1]["time"] > 0.59)  # written after it has been told
     history, smooth = node.recorder.log.columns(), LowPass(10.0)
     turns = history["plate.orientation"]
     torques = [rotation.rotate(turn, torque) for turn, torque in zip(turns, history["plate.torque"], strict=True)]

@@ -29,16 +29,16 @@ def test_the_worst_place_is_found_among_those_kept_in_mind(monkeypatch):
 
 
 def test_however_far_the_worst_place_is():
-    bar = trimesh.creation.box((1000.0, 1.0, 1.0))
-    body = sample_body(bar, radius=15.0, count=50)
-    along = np.linspace(-500.0, 500.0, 20001)
-    corners = np.array([[0.0, y, z] for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    worst = distances((along[:, None, None] * [1.0, 0.0, 0.0] + corners).reshape(-1, 3), body.points).max()
+    """Of eight cubes in a row, far apart, more than half have no particle."""
+    cubes = [trimesh.creation.box((1.0, 1.0, 1.0)).apply_translation([100.0 * k, 0.0, 0.0]) for k in range(8)]
+    row = trimesh.util.concatenate(cubes)
+    body = sample_body(row, radius=3.0, count=3)
+    worst = distances(np.asarray(row.vertices), body.points).max()
     assert worst > 2.0 * body.spacing
     assert body.coverage == pytest.approx(worst, rel=2e-3)
     assert body.evenness.farthest * body.spacing == pytest.approx(neighbours(body.points).max(), rel=1e-4)
     with pytest.raises(MeshError, match="could pass"):
-        sample_body(bar, radius=15.0, count=50, grain=0.9 * worst - 15.0)
+        sample_body(row, radius=3.0, count=3, grain=0.9 * worst - 3.0)
 
 
 def test_what_lies_otherwise_than_it_should_is_told():
