@@ -1,12 +1,13 @@
 """``--set PATH=VALUE``: entries of a scene file changed for one call of a verb."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from sand_sim.scene.reading import parse_scene, read_scene
+from sand_sim.scene.reading import load_scene
 from sand_sim.scene.types import Scene, SceneError
 from sand_sim.study.scene_writing import PATHS
 from sand_sim.study.variation import Edit, Facts, Variation, to
@@ -33,11 +34,7 @@ def load_changed(path: Path, edits: list[Edit]) -> Scene:
     Raises:
         SceneError: if the file cannot be read, an entry cannot be changed or a field is wrong.
     """
-    parsed = apply_edits(Variation("", "", tuple(edits)), parse_scene(path))
-    try:
-        return read_scene(parsed, path.resolve().parent, path.stem)
-    except SceneError as error:
-        raise SceneError(f"{path}: {error}") from None
+    return load_scene(path, partial(apply_edits, Variation("", "", tuple(edits))))
 
 
 def apply_edits(variation: Variation, parsed: dict, facts: Facts | None = None) -> dict:

@@ -52,11 +52,12 @@ class _Loader(yaml.SafeLoader):
         return node
 
 
-def load_scene(path: str | Path) -> Scene:
+def load_scene(path: str | Path, change: Callable[[Any], Any] = lambda parsed: parsed) -> Scene:
     """Read and check a scene file.
 
     Args:
         path: YAML file; relative paths in it start at its folder.
+        change: applied to its content before it is checked.
 
     Raises:
         SceneError: if the file cannot be read or a field is wrong; the message names the field and how to mend it.
@@ -64,7 +65,7 @@ def load_scene(path: str | Path) -> Scene:
     path = Path(path)
     parsed = parse_scene(path)
     try:
-        return read_scene(parsed, path.resolve().parent, path.stem)
+        return read_scene(change(parsed), path.resolve().parent, path.stem)
     except SceneError as error:
         raise SceneError(f"{path}: {error}") from None
 

@@ -119,7 +119,7 @@ class RunLog:
         return names | {f"wall.{name}.{part}" for name in self._plungers for part in _OF_PLUNGER}
 
     @property
-    def _peaks(self) -> set[str]:
+    def _peak_names(self) -> set[str]:
         """Of all peaks."""
         return {"momentum_residual"} | {f"{tool.name}.{name}" for tool in self.scene.tools for name in _LOADS}
 
@@ -160,7 +160,7 @@ class RunLog:
             elif kind == "view":
                 phase, _, part = name_there.rpartition("/")
                 views.setdefault(phase, {})[part] = array
-        if packed and (columns.keys() != self._names or peaks.keys() != self._peaks):
+        if packed and (columns.keys() != self._names or peaks.keys() != self._peak_names):
             raise ValueError("history: not of this scene")
         try:
             rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
