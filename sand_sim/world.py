@@ -119,12 +119,13 @@ class World(Changeable):
         return check_command(command)
 
     def pose_after(self, velocity: ToolVelocity, duration: float) -> ToolPose:
-        """Where a velocity leads a tool from where it is, in a time [s].
+        """Where a velocity leads a tool from where it is, in a time [s], and when.
 
         Raises:
             CommandError: as ``check``, and if it is half a turn or more.
         """
-        return pose_after(self.check(velocity), *self._tracks[self._tool_index[velocity.tool]].at(self.time), duration)
+        pose = pose_after(self.check(velocity), *self._tracks[self._tool_index[velocity.tool]].at(self.time), duration)
+        return replace(pose, time=self.time + duration)
 
     def apply(self, command: ToolPose) -> None:
         """Set a tool on its way to a pose; without a time it gets there as fast as it may.
