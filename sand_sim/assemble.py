@@ -172,7 +172,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         bodies=len(table.bodies) > 0,
         smooth_tools=any(one.smooth for one in (*tools, *grounds)),
         surfaces=kinds_of(walls),
-        carry=loses_digits(scene, time_step, precision),
+        carry=loses_digits(scene, time_step, precision, smallest, _fastest_rim(table)),
     )
     mean = float(table.radius.mean())
     skin, radius = (scene.solver.skin, 0.0) if scene.solver.skin else (_SKIN * mean, mean)
@@ -258,6 +258,11 @@ def material_order(scene: Scene) -> list[str]:
     """Names of the materials, those of grains first, so that with one grain material its index is zero."""
     grains = _loose_materials(scene)
     return sorted((m.name for m in scene.materials), key=lambda name: name not in grains)
+
+
+def _fastest_rim(table: GrainTable) -> float:
+    """Fastest that a sphere turns at the start, at its rim [m/s]."""
+    return float((np.linalg.norm(table.spin, axis=1) * table.radius).max())
 
 
 def _time_step(

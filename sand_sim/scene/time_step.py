@@ -176,14 +176,36 @@ def choose_time_step(
     return TimeStep(asked, safe, contact, rayleigh, speed, reason, warning, stable)
 
 
-def loses_digits(scene: Scene, time_step: TimeStep, precision: Precision) -> bool:
+def loses_digits(scene: Scene, time_step: TimeStep, precision: Precision, smallest: dict[str, float], rim: float = 0.0) -> bool:
     """Whether rounding the fastest velocity to expect may change it by a notable share of the least that it gains in a step.
 
-    That is what gravity gives along an axis, or what friction or rolling resistance takes from a grain that it presses down.
+    That is what gravity gives along an axis, or what friction, rolling or twisting resistance takes from a grain that it presses
+    down.
+
+    Args:
+        scene: gravity, laws and their numbers.
+        time_step: and the fastest velocity to expect.
+        precision: of velocities.
+        smallest: smallest grain radius of each grain material [m].
+        rim: fastest that a grain turns, at its rim [m/s].
     """
     whole = float(np.linalg.norm(scene.gravity))
     allowed = [_ROUNDED * abs(along) for along in scene.gravity if abs(along) > _LEVEL * whole]
     numbers = {"friction", "rolling_friction"}.intersection(scene.contact.asks)
     allowed += [_RESISTED * rule.numbers[name] * whole for rule in scene.pairs for name in numbers & rule.numbers.keys()]
+    if scene.contact.twisting != "none":
+        allowed += [_RESISTED * slowing for slowing in _slowing_by_twisting(scene, smallest, whole)]
     least = min((share for share in allowed if share > 0.0), default=np.inf)
-    return 0.5 * precision.epsilon * time_step.speed > least * time_step.value
+    return 0.5 * precision.epsilon * max(time_step.speed, rim) > least * time_step.value
+
+
+def _slowing_by_twisting(scene: Scene, smallest: dict[str, float], gravity: float) -> list[float]:
+    """How fast twisting slows the rims of grains that lie on each material, ``5/3 mu g a/R``, a being the patch [m/s^2]."""
+    found = []
+    for name, radius in smallest.items():
+        density = scene.materials[scene.material_index(name)].density
+        for other in scene.materials:
+            if pair := pair_numbers(scene, name, other.name):
+                patch = (np.pi * density * gravity * radius / pair.young) ** (1.0 / 3.0)
+                found.append(5.0 / 3.0 * pair.given["friction"] * gravity * patch)
+    return found

@@ -16,7 +16,7 @@ def dent(weight):
     return (3.0 * weight * (1.0 - POISSON**2) / (4.0 * YOUNG * np.sqrt(RADIUS))) ** (2.0 / 3.0)
 
 
-def on_floor(make_world, law, slope=0.0, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), **numbers):
+def on_floor(make_world, law, slope=0.0, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), precision="double", **numbers):
     """A sphere in its own dent in a floor, under gravity tilted by a slope [rad]."""
     return make_world(
         [[0.0, 0.0, RADIUS - dent(MASS * GRAVITY * np.cos(slope))]],
@@ -28,6 +28,7 @@ def on_floor(make_world, law, slope=0.0, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.
         boundaries=floor(),
         domain={"low": [-1.0, -0.1, -0.1], "high": [1.0, 0.1, 0.1]},
         contact=law,
+        precision=precision,
         threads=1,
         numbers={"friction": 0.8} | numbers,
     )
@@ -141,6 +142,18 @@ def test_twisting_stops_a_spinning_top(make_world):
     assert halfway == pytest.approx(0.5 * spin, rel=1e-2)
     assert np.abs(rate[-1]) < 0.2 * spin  # what the twisted patch gives back
     assert np.abs(history["velocity"]).max() < 1e-6
+
+
+def test_twisting_is_not_lost_in_single_precision(make_world):
+    """Its arm is the patch, so that a step takes a few units in the last place of a fast spin."""
+    friction, spin, weight = 0.1, 500.0, MASS * GRAVITY
+    world = on_floor(make_world, {"twisting": "marshall"}, spin=[0.0, 0.0, spin], friction=friction, precision="single")
+    world.step(round(0.02 / world.time_step))
+    early, begin = world.observe().grains.spin[0, 2], world.time
+    world.step(round(0.1 / world.time_step))
+    expected = 2.0 / 3.0 * np.sqrt(RADIUS * dent(weight)) * friction * weight / INERTIA
+    late = world.observe().grains.spin[0, 2]
+    assert (early - late) / (world.time - begin) == pytest.approx(expected, rel=5e-3)
 
 
 @pytest.mark.parametrize("particle", [0.001, 0.0004])
