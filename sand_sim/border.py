@@ -319,12 +319,12 @@ class Observation:
         return _named(name, self.tools, "tool")
 
     def wall(self, name: str) -> WallReport:
-        """The report of a wall by its name; ``KeyError`` if there is none."""
+        """The report of a wall by its name; ``KeyError`` if there is none, or more than one."""
         return _named(name, self.walls, "wall")
 
 
 def _named(name: str, reports: tuple, kind: str):
-    found = {report.name: report for report in reports}
-    if name in found:
-        return found[name]
-    raise KeyError(f"there is no {kind} '{name}'; there are {', '.join(found) or 'none'}")
+    if len(found := [report for report in reports if report.name == name]) == 1:
+        return found[0]
+    known, number = ", ".join(report.name for report in reports) or "none", "more than one" if found else "no"
+    raise KeyError(f"there is {number} {kind} '{name}'; there are {known}")

@@ -19,6 +19,14 @@ def test_reports_that_are_not_there_are_told(world, kind, known):
         getattr(world.observe(), kind)("spade")
 
 
+def test_a_wall_is_not_told_in_place_of_another_of_its_name(make_world):
+    """Boundaries without names are called by their type, and the force on the last of them is not that on all."""
+    planes = [{"type": "plane", "material": "wall", "point": [0, 0, -z], "normal": [0, 0, 1]} for z in (0.0, 0.1)]
+    seen = make_world([[0.0, 0.0, 0.01]], 0.005, boundaries=planes).observe()
+    with pytest.raises(KeyError, match="there is more than one wall 'plane'; there are plane, plane"):
+        seen.wall("plane")
+
+
 @pytest.mark.parametrize(
     ("position", "orientation", "told"),
     [
