@@ -163,7 +163,8 @@ def build_mindlin_rescaled(precision: Precision, types: ContactTypes) -> wp.Func
     """Mindlin's law as above whose spring shrinks with the contact patch while the contact is unloaded.
 
     As ``mindlin``, ``F = -k_t s - 2 z sqrt(k_t m*) v_s``, and where the patch radius falls from ``a'`` to ``a`` the spring is
-    scaled by ``a / a'``, because the outer ring of the patch that opens lets go of its share.
+    scaled by ``a / a'``, because the outer ring of the patch that opens lets go of its share. What it grows by in the step is
+    scaled by half of that, as it comes while the patch shrinks; else the law would be first order in the time step.
 
     Source: Thornton, Cummins & Cleary 2013, https://doi.org/10.1016/j.powtec.2012.08.012.
     """
@@ -176,6 +177,7 @@ def build_mindlin_rescaled(precision: Precision, types: ContactTypes) -> wp.Func
         if contact.patch < memory[3]:
             share = contact.patch / memory[3]
         spring = vec3(memory[0], memory[1], memory[2]) * share
+        spring -= contact.drift * (contact.span * real(0.5) * (real(1.0) - share))
         force, stretched = mindlin(contact, pair, normal_force, spring)
         return force, vec4(stretched[0], stretched[1], stretched[2], contact.patch)
 

@@ -78,8 +78,17 @@ def test_damped_impact(make_world, integrator, order):
     assert np.all(np.abs(orders(errors) - order) < 0.3), (errors, orders(errors))
 
 
+@pytest.mark.parametrize("law", ["mindlin", "mindlin_rescaled"])
 @pytest.mark.parametrize("slope", [20.0, 45.0], ids=["sticks and slips", "slides"])
-def test_impact_with_friction_is_second_order(make_world, slope):
-    errors = mean_errors(make_world, "velocity_verlet", slope=np.radians(slope), restitution=0.5, friction=0.1)
+def test_impact_with_friction_is_second_order(make_world, slope, law):
+    numbers = {"restitution": 0.5, "friction": 0.1, "contact": {"tangential": law}}
+    errors = mean_errors(make_world, "velocity_verlet", slope=np.radians(slope), **numbers)
     assert np.all(orders(errors) > 1.5), (errors, orders(errors))
     assert errors[0] < 5e-3 * SPEED
+
+
+def test_a_spring_that_shrinks_with_its_patch_is_second_order(make_world):
+    """Without damping and with much friction it is stretched while the patch shrinks."""
+    numbers = {"restitution": 1.0, "friction": 0.3, "contact": {"tangential": "mindlin_rescaled"}}
+    errors = mean_errors(make_world, "velocity_verlet", slope=np.radians(27.0), **numbers)
+    assert np.all(orders(errors) > 1.5), (errors, orders(errors))

@@ -103,7 +103,9 @@ def mindlin(c, p, memory, push):
 def mindlin_rescaled(c, p, memory, push):
     patch = np.sqrt(c["radius"] * c["overlap"])
     if patch < memory.get("patch", 0.0):
-        memory["spring"] = memory["spring"] * patch / memory["patch"]
+        share = patch / memory["patch"]
+        grown = split(c["drift"], c["normal"])[1] * growth(c, p)
+        memory["spring"] = memory["spring"] * share - grown * (1.0 - share) / 2.0
     memory["patch"] = patch
     return mindlin(c, p, memory, push)
 
