@@ -2,8 +2,15 @@
 
 import numpy as np
 
+from sand_sim.scene.types import Scene
+
 _STOPS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 _COLOURS = np.array([[214, 184, 132], [232, 190, 90], [240, 140, 60], [205, 62, 58], [110, 24, 74]], float)
+
+
+def fastest_shown(scene: Scene) -> float:
+    """Speed at the end of the scale [m/s]: as fast as any tool may be; 1 m/s without tools."""
+    return max((tool.max_speed for tool in scene.tools), default=1.0)
 
 
 def colour_by_speed(speed: np.ndarray, fastest: float) -> np.ndarray:

@@ -1,13 +1,16 @@
 """What Rerun shows of a world: grains, tools, wrenches and health on simulated time."""
 
+from collections import Counter
+
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 import trimesh
 
 from sand_sim.border import Observation
-from sand_sim.sinks.colours import colour_by_speed
-from sand_sim.sinks.wall_mesh import shell_mesh
+from sand_sim.scene.walls import walls_of
+from sand_sim.sinks.blueprint import make_blueprint, series_styles
+from sand_sim.sinks.colours import colour_by_speed, fastest_shown
+from sand_sim.sinks.wall_mesh import wall_mesh
 from sand_sim.tool_model import ToolModel
 from sand_sim.world import World
 
@@ -28,17 +31,21 @@ class Drawing:
     """
 
     def __init__(self, world: World, stream: rr.RecordingStream, particles: bool = False):
-        self._fastest = max((tool.max_speed for tool in world.scene.tools), default=1.0)
+        self._fastest = fastest_shown(world.scene)
         self._time, self._runs, self._timeline = 0.0, 1, _TIMELINE
-        self._plungers = {wall.name for wall in world.assembly.walls if wall.drive}
+        self._plungers = [wall.name for wall in world.assembly.walls if wall.drive]
         self._recording, self._world, self._particles = stream, world, particles
+        self._laid_out = False
         self._draw_all_anew()
-        stream.send_blueprint(_blueprint(world), make_active=False, make_default=True)
         self._draw_still()
 
     def write(self, observation: Observation) -> None:
         """Add one observation."""
         recording, grains, health = self._recording, observation.spheres, observation.health
+        if not self._laid_out:
+            blueprint = make_blueprint(self._world.scene, self._plungers, observation)
+            recording.send_blueprint(blueprint, make_active=False, make_default=True)
+            self._laid_out = True
         if observation.time < self._time:
             self._runs += 1
             self._timeline = f"{_TIMELINE}_{self._runs}"
@@ -87,20 +94,26 @@ class Drawing:
         self._drawn: dict[str, ToolModel] = {}
 
     def _draw_still(self) -> None:
-        """Draw what never changes: axes and walls."""
+        """Draw what never changes: axes, walls, and how curves look."""
         recording, world = self._recording, self._world
+        low, high = world.assembly.lattice.low, world.assembly.lattice.high
         recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        for curve, style in series_styles(world.scene, self._plungers).items():
+            recording.log(curve, style, static=True)
+        number = Counter()
         for boundary in world.scene.boundaries:
+            number[boundary.name] += 1
+            entity = f"world/walls/{boundary.name}" + (f"_{number[boundary.name]}" if number[boundary.name] > 1 else "")
             if boundary.kind == "box":
                 box = rr.Boxes3D(mins=[boundary.low], sizes=[np.subtract(boundary.high, boundary.low)], colors=[[150, 150, 160]])
-                recording.log(f"world/walls/{boundary.name}", box, static=True)
-        for wall in world.assembly.walls:
-            if wall.kind == "shell":
-                corners, triangles = shell_mesh(wall)
+                recording.log(entity, box, static=True)
+                continue
+            for wall in walls_of(boundary):
+                corners, triangles = wall_mesh(wall, low, high)
                 mesh = rr.Mesh3D(vertex_positions=corners, triangle_indices=triangles, albedo_factor=[150, 150, 160, 90])
-                recording.log(f"world/walls/{wall.name}", mesh, static=True)
+                recording.log(entity, mesh, static=True)
                 if not wall.drive:
-                    recording.log(f"world/walls/{wall.name}", rr.Transform3D(translation=wall.point), static=True)
+                    recording.log(entity, rr.Transform3D(translation=wall.point), static=True)
         for ground in world.assembly.grounds:
             mesh = _flat_mesh(ground.mesh, ground.place, [150, 135, 110, 255])
             recording.log(f"world/walls/{ground.name}", mesh, static=True)
@@ -120,19 +133,4 @@ def _flat_mesh(mesh: trimesh.Trimesh, place: np.ndarray, colour: list[int]) -> r
         vertex_positions=(np.asarray(mesh.triangles) + place).reshape(-1, 3).astype(np.float32),
         vertex_normals=np.repeat(np.asarray(mesh.face_normals, np.float32), 3, axis=0),
         albedo_factor=colour,
-    )
-
-
-def _blueprint(world: World) -> rrb.Blueprint:
-    """The bed and the tools large on the left, the curves stacked on the right."""
-    names = [tool.name for tool in world.scene.tools]
-    curves = [rrb.TimeSeriesView(origin=f"force/{name}", name=f"{name}: force of the sand, world frame [N]") for name in names]
-    curves += [rrb.TimeSeriesView(origin="carried", name="carried mass [kg]")] if names else []
-    curves += [
-        rrb.TimeSeriesView(origin="health/energy", name="energy [J]"),
-        rrb.TimeSeriesView(origin="health/overlap", name="largest overlap / radius"),
-    ]
-    return rrb.Blueprint(
-        rrb.Horizontal(rrb.Spatial3DView(origin="world", name="bed and tools"), rrb.Vertical(*curves), column_shares=[3, 2]),
-        collapse_panels=True,
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from sand_sim import rotation
-from sand_sim.sinks.colours import colour_by_speed
+from sand_sim.sinks.colours import colour_by_speed, fastest_shown
 from sand_sim.sinks.run_log import RunLog, View
 from sand_sim.tool_model import ToolModel
 
@@ -19,7 +19,8 @@ def draw_run(log: RunLog, tools: list[ToolModel], path: Path) -> None:
     """Draw a run into a PNG file.
 
     Args:
-        log: the run; a view is drawn of the end of its phases ``cut``, ``carry`` and ``dump``, else of its last three phases.
+        log: the run; a view is drawn of the end of its phases ``cut``, ``carry`` and ``dump``, else of its last three phases, and
+            of the end of the run where that is later.
         tools: with their meshes.
         path: of the file; its folder is made.
     """
@@ -28,13 +29,15 @@ def draw_run(log: RunLog, tools: list[ToolModel], path: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    columns, views = log.columns(), _pick_views(log)
+    columns, views = log.columns(), pick_views(log)
     figure = plt.figure(figsize=(13.0, 7.2), layout="constrained")
-    left, right = figure.subfigures(1, 2, width_ratios=[1.0, 1.15])
+    left, right = figure.subfigures(1, 2, width_ratios=[1.5, 1.0])
     _draw_curves(left, columns, log)
+    fastest = fastest_shown(log.scene)
+    right.suptitle(f"grains by speed, from sand (at rest) to dark red ({fastest:g} m/s)", fontsize=9, x=0.02, ha="left")
     axes = np.atleast_1d(right.subplots(len(views), 1))
     for axis, (_, view) in zip(axes, views, strict=True):
-        _draw_view(axis, view, tools)
+        _draw_view(axis, view, tools, fastest)
     limits = np.array([[axis.get_xlim(), axis.get_ylim()] for axis in axes])
     low, high = limits[..., 0].min(axis=0), limits[..., 1].max(axis=0)
     for axis, (name, view) in zip(axes, views, strict=True):
@@ -46,9 +49,13 @@ def draw_run(log: RunLog, tools: list[ToolModel], path: Path) -> None:
     plt.close(figure)
 
 
-def _pick_views(log: RunLog) -> list[tuple[str, View]]:
-    wanted = [name for name in ("cut", "carry", "dump") if name in log.views] or list(log.views)[-_VIEWS:]
-    return [(name, log.views[name]) for name in wanted] or [("end", View.of(log.last))]
+def pick_views(log: RunLog) -> list[tuple[str, View]]:
+    """Moments of a run that are drawn, and what they are called."""
+    digging = [name for name in ("cut", "carry", "dump") if name in log.views]
+    views, end = [(name, log.views[name]) for name in digging or log.views], View.of(log.last)
+    if not digging and (not views or views[-1][1].time < end.time):
+        views.append(("end", end))
+    return views[-_VIEWS:]
 
 
 def _draw_curves(figure, columns: dict[str, np.ndarray], log: RunLog) -> None:
@@ -82,14 +89,14 @@ def _project(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([x, z * np.cos(_TILT) + y * np.sin(_TILT)], -1), y * np.cos(_TILT) - z * np.sin(_TILT)
 
 
-def _draw_view(axis, view: View, tools: list[ToolModel]) -> None:
+def _draw_view(axis, view: View, tools: list[ToolModel], fastest: float) -> None:
     """Grains and tool faces behind the plane through the first tool, far ones first."""
     from matplotlib.collections import EllipseCollection, PolyCollection
 
     cut = view.tool_position[0, 1] if len(view.tool_position) else -np.inf
     shown = np.flatnonzero(view.position[:, 1] > cut - view.radius)
     spots, depth = _project(view.position[shown])
-    colours = colour_by_speed(view.speed[shown], 1.0) / 255.0
+    colours = colour_by_speed(view.speed[shown], fastest) / 255.0
     nearest, farthest = (depth.min(), depth.max()) if len(depth) else (0.0, 0.0)
     shade = 0.62 + 0.38 * np.clip(1.0 - (depth - nearest) / ((farthest - nearest) or 1.0), 0.0, 1.0)
     items = [(d, "grain", k) for k, d in enumerate(depth)]
