@@ -4,13 +4,24 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from sand_sim.border import CommandError, Observation, ToolPose
+    from sand_sim.border import CommandError, Observation, ToolPose, ToolVelocity
     from sand_sim.engine.explicit_dem import UnstableError
     from sand_sim.scene.reading import load_scene, read_scene
     from sand_sim.scene.types import Scene, SceneError
     from sand_sim.world import World
 
-__all__ = ["CommandError", "Observation", "Scene", "SceneError", "ToolPose", "UnstableError", "World", "load_scene", "read_scene"]
+__all__ = [
+    "CommandError",
+    "Observation",
+    "Scene",
+    "SceneError",
+    "ToolPose",
+    "ToolVelocity",
+    "UnstableError",
+    "World",
+    "load_scene",
+    "read_scene",
+]
 
 _HOMES = {
     "CommandError": "border",
@@ -18,6 +29,7 @@ _HOMES = {
     "Scene": "scene.types",
     "SceneError": "scene.types",
     "ToolPose": "border",
+    "ToolVelocity": "border",
     "UnstableError": "engine.explicit_dem",
     "World": "world",
     "load_scene": "scene.reading",

@@ -7,8 +7,7 @@ import pytest
 from scenes import floor, write_small_scene
 
 from sampler.cores import available_cores
-from sand_sim import CommandError, SceneError, World, load_scene
-from sand_sim.border import ToolVelocity
+from sand_sim import CommandError, SceneError, ToolVelocity, World, load_scene
 from sand_sim.cli.main import main
 
 LIQUID = {"bridge_volume": 0.01}
