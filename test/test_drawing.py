@@ -62,9 +62,11 @@ def test_a_cylinder_without_end_is_drawn_along_the_domain():
 def test_walls_of_one_name_are_all_drawn_each_in_its_place(tmp_path):
     plane = {"type": "plane", "material": "steel", "point": [0, 0, 0], "normal": [0, 0, 1]}
     press = {"type": "plunger", "material": "steel", "point": [0, 0, 0.2], "normal": [0, 0, -1], "velocity": 0.0}
-    world, places = World(load_scene(write_small_scene(tmp_path, boundaries=[plane, press, plane]))), {}
+    world, places, shapes = World(load_scene(write_small_scene(tmp_path, boundaries=[plane, press, plane]))), {}, {}
 
     def log(entity, shown, **_):
+        if entity.startswith("world/walls/") and not isinstance(shown, rr.Transform3D):
+            shapes[entity.rpartition("/")[2]] = type(shown)
         if isinstance(shown, rr.Transform3D):
             places[entity] = shown.translation.as_arrow_array().to_pylist()[0]
 
@@ -73,6 +75,9 @@ def test_walls_of_one_name_are_all_drawn_each_in_its_place(tmp_path):
     )
     del places["world/tools/plate"]
     heights = {"plane": 0.0, "plane_2": 0.0, "plunger": 0.2}
+    assert shapes == {"plane": rr.Mesh3D, "plane_2": rr.Mesh3D, "plunger": rr.LineStrips3D}, (
+        "only floors hide what is behind them"
+    )
     assert places == {f"world/walls/{name}": pytest.approx([0.0, 0.0, z]) for name, z in heights.items()}
 
 

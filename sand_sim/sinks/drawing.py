@@ -7,15 +7,16 @@ import rerun as rr
 import trimesh
 
 from sand_sim.border import Observation
-from sand_sim.scene.walls import walls_of
+from sand_sim.scene.walls import Wall, walls_of
 from sand_sim.sinks.blueprint import make_blueprint, series_styles
 from sand_sim.sinks.colours import colour_by_speed, fastest_shown
-from sand_sim.sinks.wall_mesh import wall_mesh
+from sand_sim.sinks.wall_mesh import plane_outline, wall_mesh
 from sand_sim.tool_model import ToolModel
 from sand_sim.world import World
 
 _TIMELINE = "sim_time"
 _AXES = "xyz"
+_FLOOR = 0.5  # cosine of the slope up to which a plane is a floor
 
 
 class Drawing:
@@ -96,7 +97,6 @@ class Drawing:
     def _draw_still(self) -> None:
         """Draw what never changes: axes, walls, and how curves look."""
         recording, world = self._recording, self._world
-        low, high = world.assembly.lattice.low, world.assembly.lattice.high
         recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         for curve, style in series_styles(world.scene, self._plungers).items():
             recording.log(curve, style, static=True)
@@ -109,14 +109,22 @@ class Drawing:
                 recording.log(entity, box, static=True)
                 continue
             for wall in walls_of(boundary):
-                corners, triangles = wall_mesh(wall, low, high)
-                mesh = rr.Mesh3D(vertex_positions=corners, triangle_indices=triangles, albedo_factor=[150, 150, 160, 90])
-                recording.log(entity, mesh, static=True)
+                recording.log(entity, self._wall(wall), static=True)
                 if not wall.drive:
                     recording.log(entity, rr.Transform3D(translation=wall.point), static=True)
         for ground in world.assembly.grounds:
             mesh = _flat_mesh(ground.mesh, ground.place, [150, 135, 110, 255])
             recording.log(f"world/walls/{ground.name}", mesh, static=True)
+
+    def _wall(self, wall: Wall) -> rr.Mesh3D | rr.LineStrips3D:
+        """A wall around its point; of planes that are no floors only the outline, as several would hide the grains."""
+        low, high = self._world.assembly.lattice.low, self._world.assembly.lattice.high
+        down = np.array(self._world.scene.gravity)
+        if wall.kind == "plane" and not wall.direction @ down < -_FLOOR * np.linalg.norm(down):
+            corners = plane_outline(wall, low, high)
+            return rr.LineStrips3D([np.concatenate([corners, corners[:1]])], colors=[[150, 150, 160]])
+        corners, triangles = wall_mesh(wall, low, high)
+        return rr.Mesh3D(vertex_positions=corners, triangle_indices=triangles, albedo_factor=[150, 150, 160, 90])
 
     def _draw_tool(self, model: ToolModel) -> None:
         """Draw the mesh and the particles that a tool has from now on."""

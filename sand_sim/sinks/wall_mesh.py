@@ -19,15 +19,21 @@ def wall_mesh(wall: Wall, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray
         Corners around ``wall.point``, shape (n, 3) [m], and indices of the corners of each triangle, shape (m, 3).
     """
     if wall.kind == "plane":
-        return _plane(wall, low, high)
+        corners = plane_outline(wall, low, high)
+        fan = np.arange(1, max(len(corners) - 1, 1))
+        triangles = np.column_stack([np.zeros_like(fan), fan, fan + 1])
+        return corners, np.concatenate([triangles, triangles[:, ::-1]])
     if wall.kind == "cylinder":
         along = (_box_corners(low, high) - wall.point) @ wall.direction
         return _turned(wall.direction, [(wall.radius, along.min()), (wall.radius, along.max())])
     return _turned(wall.direction, [wall.begin, wall.end])
 
 
-def _plane(wall: Wall, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The part in the domain: a square wider than that, clipped along its faces."""
+def plane_outline(wall: Wall, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Corners around ``wall.point`` of what lies of a plane in the domain, shape (n, 3) [m], none if nothing does.
+
+    It is a square wider than the domain, clipped along the faces of that.
+    """
     across, beside = _tangents(wall.direction)
     wide = np.linalg.norm(high - low)
     middle = 0.5 * (low + high)
@@ -44,9 +50,7 @@ def _plane(wall: Wall, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, n
                 if depth >= 0.0:
                     kept.append(here)
             polygon = kept
-    fan = np.arange(1, max(len(polygon) - 1, 1))
-    triangles = np.column_stack([np.zeros_like(fan), fan, fan + 1])
-    return np.reshape(polygon, (-1, 3)) - wall.point, np.concatenate([triangles, triangles[:, ::-1]])
+    return np.reshape(polygon, (-1, 3)) - wall.point
 
 
 def _turned(axis: np.ndarray, line: list) -> tuple[np.ndarray, np.ndarray]:
