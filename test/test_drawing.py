@@ -19,8 +19,6 @@ from sand_sim.sinks.blueprint import series_styles
 from sand_sim.sinks.drawing import Drawing
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "python.md"
-
-
 LOW, HIGH = np.array([-1.0, -0.5, 0.0]), np.array([1.0, 0.5, 2.0])  # of a domain
 
 
@@ -75,9 +73,7 @@ def test_walls_of_one_name_are_all_drawn_each_in_its_place(tmp_path):
     )
     del places["world/tools/plate"]
     heights = {"plane": 0.0, "plane_2": 0.0, "plunger": 0.2}
-    assert shapes == {"plane": rr.Mesh3D, "plane_2": rr.Mesh3D, "plunger": rr.LineStrips3D}, (
-        "only floors hide what is behind them"
-    )
+    assert shapes == {"plane": rr.Mesh3D, "plane_2": rr.Mesh3D, "plunger": rr.LineStrips3D}, "floors alone hide what is behind"
     assert places == {f"world/walls/{name}": pytest.approx([0.0, 0.0, z]) for name, z in heights.items()}
 
 

@@ -8,9 +8,7 @@ from sand_sim.border import Observation
 from sand_sim.scene.types import Scene
 from sand_sim.sinks.colours import fastest_shown
 
-_EYE = np.array(
-    [0.45, -1.0, 0.55]
-)  # from where the eye looks at the middle of the sand: from the right, in front of it and above
+_EYE = np.array([0.45, -1.0, 0.55])  # from where the eye looks at the middle of the sand: from the right, ahead and above
 _AWAY = 1.5  # of the diagonal of what is to be seen
 _STANDING = ("cylinder", "cone")  # boundaries that begin at a point of theirs, which a plane has anywhere
 _RED, _GREEN, _BLUE, _GREY, _ORANGE = [220, 70, 60], [80, 170, 80], [70, 120, 230], [150, 150, 150], [235, 150, 50]

@@ -1,6 +1,7 @@
 """Triangles to draw walls with."""
 
 import numpy as np
+import trimesh
 
 from sand_sim.scene.walls import Wall
 
@@ -24,7 +25,7 @@ def wall_mesh(wall: Wall, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray
         triangles = np.column_stack([np.zeros_like(fan), fan, fan + 1])
         return corners, np.concatenate([triangles, triangles[:, ::-1]])
     if wall.kind == "cylinder":
-        along = (_box_corners(low, high) - wall.point) @ wall.direction
+        along = (trimesh.bounds.corners([low, high]) - wall.point) @ wall.direction
         return _turned(wall.direction, [(wall.radius, along.min()), (wall.radius, along.max())])
     return _turned(wall.direction, [wall.begin, wall.end])
 
@@ -32,7 +33,7 @@ def wall_mesh(wall: Wall, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray
 def plane_outline(wall: Wall, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Corners around ``wall.point`` of what lies of a plane in the domain, shape (n, 3) [m], none if nothing does.
 
-    It is a square wider than the domain, clipped along the faces of that.
+    It is a square wider than the domain, clipped along the faces of that; trimesh would need SciPy for it.
     """
     across, beside = _tangents(wall.direction)
     wide = np.linalg.norm(high - low)
@@ -70,7 +71,3 @@ def _tangents(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
     across /= np.linalg.norm(across)
     return across, np.cross(direction, across)
-
-
-def _box_corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    return np.where(np.indices((2, 2, 2)).reshape(3, -1).T, high, low)
