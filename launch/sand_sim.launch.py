@@ -28,7 +28,7 @@ OTHERS = {
     "name": ("sand_sim", "Name of the node."),
     "namespace": ("", "Namespace of the node."),
     "params_file": (str(CONFIG / "ros" / "node.yaml"), "Further parameters; arguments that are given take precedence."),
-    "rviz": ("false", "Open RViz with tool frames, grains and contact forces; set up for /sand_sim, a bucket, and world."),
+    "rviz": ("false", "Open RViz with tools, boundaries, grains and contact forces; set up for /sand_sim, a bucket, and world."),
 }
 
 

@@ -1,4 +1,4 @@
-"""``visualization_msgs``: contact forces as lines, for RViz."""
+"""``visualization_msgs``: contact forces as lines, meshes and outlines, for RViz."""
 
 import numpy as np
 from geometry_msgs.msg import Point
@@ -26,6 +26,28 @@ def contacts_to_markers(contacts: ToolContacts, time: float, frame_id: str, metr
     points = _marker(contacts.tool, _POINT, Marker.POINTS, time, frame_id, (0.1, 0.2, 0.9), size)
     points.points = _points(contacts.point)
     return MarkerArray(markers=[lines, points])
+
+
+def triangles_to_marker(triangles: np.ndarray, name: str, frame_id: str, colour: tuple) -> Marker:
+    """A mesh that follows its frame.
+
+    Args:
+        triangles: in that frame, shape (n, 3, 3) [m].
+        name: its namespace.
+        frame_id: of its frame.
+        colour: red, green, blue, opacity; 0 to 1.
+    """
+    marker = _marker(name, 0, Marker.TRIANGLE_LIST, 0.0, frame_id, colour[:3], 1.0)
+    marker.scale.z, marker.color.a, marker.frame_locked = 1.0, colour[3], True
+    marker.points = _points(np.reshape(triangles, (-1, 3)))
+    return marker
+
+
+def lines_to_marker(ends: np.ndarray, name: str, frame_id: str, colour: tuple, width: float) -> Marker:
+    """Lines, given their ends, shape (n, 2, 3) [m]; the rest as ``triangles_to_marker``, the width in metres."""
+    marker = _marker(name, 0, Marker.LINE_LIST, 0.0, frame_id, colour, width)
+    marker.points = _points(np.reshape(ends, (-1, 3)))
+    return marker
 
 
 def _marker(namespace: str, number: int, kind: int, time: float, frame_id: str, colour: tuple, size: float) -> Marker:

@@ -30,6 +30,7 @@ from sand_sim.node.parameters import Parameters, tool_declarations
 from sand_sim.node.robot import read_robot
 from sand_sim.node.run_files import RunFiles
 from sand_sim.node.services import Services
+from sand_sim.node.shape_outputs import ShapeOutputs
 from sand_sim.node.simulation_services import SimulationServices
 from sand_sim.node.tool_inputs import ToolInputs, check_sources, fixed_frames
 from sand_sim.node.tool_outputs import ToolOutputs
@@ -225,6 +226,7 @@ class SandSimNode(ManagedNode):
         self._diagnostics = connections.publisher(DiagnosticArray, "/diagnostics")
         self._frames = connections.publisher(tf2_msgs.TFMessage, "/tf") if tf2_msgs.TFMessage else None
         self._tools = [ToolOutputs(connections, parameters, world, tool.name) for tool in world.scene.tools]
+        self._shapes = ShapeOutputs(connections, parameters, world)
         self._bed = BedOutputs(connections, parameters, world, self._complain)
         self._endings.callback(self._bed.close)
         inputs = ToolInputs(connections, parameters, self.simulation, lambda: self._active, frames, lambda: self._last)
@@ -245,7 +247,7 @@ class SandSimNode(ManagedNode):
         self._endings.close()
         # The node may go on for long: what it still held would keep the world's memory and its threads.
         self.simulation = self.recorder = self.answering = self._last = self._diagnosed = None
-        self._tools, self._bed, self._diagnosis, self._watch = [], None, None, None
+        self._tools, self._shapes, self._bed, self._diagnosis, self._watch = [], None, None, None, None
 
     def _finish_files(self) -> None:
         for path in self.recorder.close():
@@ -275,6 +277,7 @@ class SandSimNode(ManagedNode):
         self._publish_clock(observation)
         for tool in self._tools:
             tool.publish(observation)
+        self._shapes.publish(observation)
         self._publish_frames(observation)
 
     def _publish_frames(self, observation: Observation) -> None:
@@ -302,6 +305,7 @@ class SandSimNode(ManagedNode):
             return
         self._diagnostics.publish(self._diagnosis.tell(self._last, self._bed.dropped, self.recorder.troubles))
         self._watch.look()
+        self._shapes.tell(self._last)
         # Whoever comes while nothing moves still sees where it stands.
         if self.simulation.fault is not None:
             self._publish_state(self._last)

@@ -10,13 +10,12 @@ from sand_sim.border import Observation
 from sand_sim.scene.walls import Wall, walls_of
 from sand_sim.sinks.blueprint import make_blueprint, series_styles
 from sand_sim.sinks.colours import colour_by_speed, fastest_shown
-from sand_sim.sinks.wall_mesh import plane_outline, wall_mesh
+from sand_sim.sinks.wall_mesh import is_floor, plane_outline, wall_mesh
 from sand_sim.tool_model import ToolModel
 from sand_sim.world import World
 
 _TIMELINE = "sim_time"
 _AXES = "xyz"
-_FLOOR = 0.5  # cosine of the slope up to which a plane is a floor
 
 
 class Drawing:
@@ -117,10 +116,9 @@ class Drawing:
             recording.log(f"world/walls/{ground.name}", mesh, static=True)
 
     def _wall(self, wall: Wall) -> rr.Mesh3D | rr.LineStrips3D:
-        """A wall around its point; of planes that are no floors only the outline, as several would hide the grains."""
+        """A wall around its point."""
         low, high = self._world.assembly.lattice.low, self._world.assembly.lattice.high
-        down = np.array(self._world.scene.gravity)
-        if wall.kind == "plane" and not wall.direction @ down < -_FLOOR * np.linalg.norm(down):
+        if wall.kind == "plane" and not is_floor(wall, self._world.scene.gravity):
             corners = plane_outline(wall, low, high)
             return rr.LineStrips3D([np.concatenate([corners, corners[:1]])], colors=[[150, 150, 160]])
         corners, triangles = wall_mesh(wall, low, high)

@@ -104,5 +104,5 @@ def test_parameter_file_names_parameters_with_their_defaults():
 def test_rviz_shows_topics_of_the_node():
     displays = yaml.safe_load((config_folder() / "ros" / "sand_sim.rviz").read_text())["Visualization Manager"]["Displays"]
     topics = {display["Topic"]["Value"] for display in displays if "Topic" in display}
-    tool = "/sand_sim/tools/bucket"
-    assert topics <= {"/sand_sim/points", "/sand_sim/heights", f"{tool}/contact_markers", f"{tool}/wrench_filtered"}
+    names = "points", "heights", "shapes", "plungers", "tools/bucket/contact_markers", "tools/bucket/wrench_filtered"
+    assert topics == {f"/sand_sim/{name}" for name in names}
