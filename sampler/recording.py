@@ -45,6 +45,7 @@ class Recording:
             rrb.Spatial3DView(name="signed distance", contents=["/mesh", "/field/**"]),
         ]
         self._stream.save(path, rrb.Blueprint(rrb.Horizontal(*views), collapse_panels=True))
+        self._log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self._log("mesh", self._mesh(np.asarray(mesh.triangles), [150, 150, 150, 60]), static=True)
 
     def particles(self, points: np.ndarray) -> None:
