@@ -24,7 +24,7 @@ def find_doubts(health: Health, safe_now: float, beforehand: tuple[str, ...] = (
     if health.step_ratio > 1.0001:
         doubts.append(f"time step is {health.step_ratio:.2g} times the safe one")
     if health.deepest > DEEP:
-        remedy = "stiffen the material or slow the tool"
+        remedy = "stiffen the material or slow what presses on it"
         if health.deepest > _CRUSHED:
             remedy += "; or does a tool crush grains against a wall, which it goes through?"
         doubts.append(f"overlap reached {100.0 * health.deepest:.1f} % of a radius; {remedy}")

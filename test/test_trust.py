@@ -31,7 +31,7 @@ def test_each_indicator_is_doubted_beyond_its_limit(field, limit, told):
 def test_crushed_grains_may_be_between_a_tool_and_a_wall():
     (pressed,), (crushed,) = (find_doubts(replace(SOUND, deepest=deepest), 1e-5).doubts for deepest in (0.45, 0.55))
     assert "wall" not in pressed
-    assert crushed.endswith("slow the tool; or does a tool crush grains against a wall, which it goes through?")
+    assert crushed.endswith("slow what presses on it; or does a tool crush grains against a wall, which it goes through?")
 
 
 def test_a_run_no_faster_than_expected_is_not_too_fast():

@@ -16,7 +16,7 @@ _TWO_OF_A_NAME = (
 
 
 class GraphWatch:
-    """Warns once of each publisher that tries to drive a tool but is not heard, or that publishes another time than ours.
+    """Warns once of each publisher that tries to drive a tool but is not heard, or beside another, or that tells another time.
 
     Args:
         node: that listens.
@@ -48,11 +48,17 @@ class GraphWatch:
 
     def _look_at_commands(self, tool: str, kind: str, type_name: str) -> None:
         topic, source = self._node.resolve_topic_name(f"~/tools/{tool}/{kind}"), self._parameters[f"tools.{tool}.source"]
+        heard = set()
         for publisher in self._publishers(topic):
             if kind != source:
                 self._tell(topic, publisher, f"and is not heard; the tool follows tools.{tool}.source:={source}")
             elif publisher.topic_type != type_name:
                 self._tell(topic, publisher, f"and is not heard; {type_name} is needed")
+            else:
+                who = publisher.node_namespace, publisher.node_name
+                if heard - {who}:
+                    self._tell(topic, publisher, "as another node does; the tool goes where either has said last")
+                heard.add(who)
 
     def _publishers(self, topic: str) -> list:
         return [one for one in self._node.get_publishers_info_by_topic(topic) if one.node_name != _NOT_YET_KNOWN]

@@ -86,6 +86,17 @@ def test_a_forgotten_node_of_the_same_name(client, start_node, namespace):
         rclpy.try_shutdown(context=context)
 
 
+def test_two_nodes_that_drive_one_tool_are_told(client, stranger, start_node):
+    heard = []
+    client.node.create_subscription(Log, "/rosout", lambda log: heard.append(log.msg), LATCHED)
+    start_node(pacing="lockstep")
+    client.node.create_publisher(PoseStamped, f"{TOOL}/pose", 1)
+    client.wait_for(lambda: len(client.diagnostics) > 2)
+    assert not any("as another node does" in message for message in heard), "two publishers of one node"
+    stranger.create_publisher(PoseStamped, f"{TOOL}/pose", 1)
+    client.wait_for(lambda: any("publishes geometry_msgs/msg/PoseStamped as another node does" in line for line in heard))
+
+
 def test_the_advice_on_quality_of_service_helps(client, start_node):
     node = start_node(pacing="lockstep", **{f"qos_overrides.{TOOL}/pose.subscription.reliability": "best_effort"})
     lossy = client.node.create_publisher(PoseStamped, f"{TOOL}/pose", LOSSY)
