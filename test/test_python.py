@@ -1,4 +1,6 @@
-"""A world as programs use it: what makes no sense is refused in words."""
+"""A world as programs use it: what makes no sense is refused in words, and a scene can be handed on."""
+
+import pickle
 
 import numpy as np
 import pytest
@@ -69,3 +71,12 @@ def test_numbers_of_steps_may_come_from_numpy(world):
 def test_the_name_of_a_file_is_no_scene():
     with pytest.raises(SceneError, match=r"scene: must be a Scene, got 'dig.yaml'; 'load_scene\(path\)' reads one"):
         World("dig.yaml")
+
+
+def test_the_scene_of_a_world_goes_to_other_processes(world):
+    again = World(pickle.loads(pickle.dumps(world.scene)))
+    assert again.scene == world.scene
+    for here in (world, again):
+        here.reset()
+        here.step(50)
+    assert np.array_equal(world.observe().grains.position, again.observe().grains.position)

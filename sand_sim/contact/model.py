@@ -1,7 +1,6 @@
 """The choice of contact laws, one per slot, and how their memories lie side by side in a contact."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 from sand_sim.contact.cohesion import COHESION_LAWS
 from sand_sim.contact.contact import ContactTypes, contact_type, pair_type
@@ -34,7 +33,7 @@ class ContactModel:
         """The chosen law of a slot."""
         return SLOTS[slot][getattr(self, slot)]
 
-    @cached_property
+    @property  # not cached: a scene that has been used goes to other processes, and what builds kernels cannot
     def laws(self) -> dict[str, Law]:
         """Chosen laws by slot."""
         return {slot: self.law(slot) for slot in SLOTS}
