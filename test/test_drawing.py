@@ -99,6 +99,18 @@ def test_a_figure_shows_the_end_of_a_run_that_goes_on_after_its_last_phase(tmp_p
     assert [name for name, _ in pick_views(log)] == views
 
 
+def test_a_viewer_that_is_open_takes_the_views_of_the_run(tmp_path):
+    """By the time they come it has views of its own, or those of another scene."""
+    world, sent = World(load_scene(write_small_scene(tmp_path))), []
+    stream = SimpleNamespace(
+        log=lambda *_, **__: None, set_time=lambda *_, **__: None, send_blueprint=lambda _, **options: sent.append(options)
+    )
+    drawing = Drawing(world, stream)
+    for _ in range(2):
+        drawing.write(world.observe())
+    assert [options.get("make_active", True) for options in sent] == [True], "once, so that it may be changed by hand"
+
+
 def test_all_that_is_drawn_is_told_of(tmp_path):
     press = {"type": "plunger", "name": "press", "material": "steel", "point": [0, 0, 0.2], "normal": [0, 0, -1], "velocity": 0.0}
     path = write_small_scene(tmp_path)

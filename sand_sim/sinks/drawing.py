@@ -44,7 +44,7 @@ class Drawing:
         recording, grains, health = self._recording, observation.spheres, observation.health
         if not self._laid_out:
             blueprint = make_blueprint(self._world.scene, self._plungers, observation)
-            recording.send_blueprint(blueprint, make_active=False, make_default=True)
+            recording.send_blueprint(blueprint)
             self._laid_out = True
         if observation.time < self._time:
             self._runs += 1

@@ -75,11 +75,13 @@ class Viewer:
 
 
 def open_viewer() -> bool:
-    """Open a viewer and wait until it can be sent to; it stays open when we end.
+    """Open a viewer, unless one is open already, and wait until it can be sent to; it stays open when we end.
 
     Returns:
-        Whether one could be opened; not so, for example, without a screen.
+        Whether there is one; not so, for example, without a screen.
     """
+    if _listens():
+        return True
     # Rerun's own spawn helper listens on all interfaces.
     command = [sys.executable, "-m", "rerun", "--bind", _HOST, "--port", str(PORT)]
     viewer = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
