@@ -100,15 +100,26 @@ def test_a_figure_shows_the_end_of_a_run_that_goes_on_after_its_last_phase(tmp_p
 
 
 def test_a_viewer_that_is_open_takes_the_views_of_the_run(tmp_path):
-    """By the time they come it has views of its own, or those of another scene."""
-    world, sent = World(load_scene(write_small_scene(tmp_path))), []
-    stream = SimpleNamespace(
-        log=lambda *_, **__: None, set_time=lambda *_, **__: None, send_blueprint=lambda _, **options: sent.append(options)
+    """By the time they come it has views of its own, or those of another scene, and after a reset the time of the run before."""
+    world, sent, times = World(load_scene(write_small_scene(tmp_path))), [], []
+
+    def send(blueprint, make_active=True, **_):
+        sent.append((blueprint.time_panel.timeline, make_active))
+
+    def set_time(timeline, **_):
+        times.append(timeline)
+
+    drawing = Drawing(
+        world, SimpleNamespace(log=lambda *_, **__: None, set_time=set_time, send_blueprint=send, reset_time=times.clear)
     )
-    drawing = Drawing(world, stream)
-    for _ in range(2):
+    for steps in (0, 10, 10):
+        world.step(steps) if steps else world.reset()
         drawing.write(world.observe())
-    assert [options.get("make_active", True) for options in sent] == [True], "once, so that it may be changed by hand"
+    assert sent == [("sim_time", True)], "once, so that it may be changed by hand"
+    world.reset()
+    drawing.write(world.observe())
+    assert sent[1:] == [("sim_time_2", True)]
+    assert times == ["sim_time_2"]
 
 
 def test_all_that_is_drawn_is_told_of(tmp_path):

@@ -16,13 +16,14 @@ _AXES = {"x": _RED, "y": _GREEN, "z": _BLUE}  # as Rerun and RViz colour axes
 _ENERGIES = {"kinetic": _ORANGE, "elastic": _BLUE, "dissipated": _GREY}
 
 
-def make_blueprint(scene: Scene, plungers: list[str], first: Observation) -> rrb.Blueprint:
+def make_blueprint(scene: Scene, plungers: list[str], first: Observation, timeline: str) -> rrb.Blueprint:
     """The bed and the tools large on the left, the curves stacked on the right.
 
     Args:
         scene: tools and how fast they are.
         plungers: names of walls whose force is drawn.
         first: what is seen at the start, which the eye looks at.
+        timeline: that is shown.
     """
     fastest = fastest_shown(scene)
     bed = rrb.Spatial3DView(
@@ -43,7 +44,8 @@ def make_blueprint(scene: Scene, plungers: list[str], first: Observation) -> rrb
         rrb.TimeSeriesView(origin="health/energy", name="energy [J]"),
         rrb.TimeSeriesView(origin="health/overlap", name="largest overlap so far / radius"),
     ]
-    return rrb.Blueprint(rrb.Horizontal(bed, rrb.Vertical(*curves), column_shares=[3, 2]), collapse_panels=True)
+    views = rrb.Horizontal(bed, rrb.Vertical(*curves), column_shares=[3, 2])
+    return rrb.Blueprint(views, rrb.TimePanel(timeline=timeline, state="collapsed"), collapse_panels=True)
 
 
 def series_styles(scene: Scene, plungers: list[str]) -> dict[str, rr.SeriesLines]:

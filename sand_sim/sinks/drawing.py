@@ -35,22 +35,21 @@ class Drawing:
         self._time, self._runs, self._timeline = 0.0, 1, _TIMELINE
         self._plungers = [wall.name for wall in world.assembly.walls if wall.drive]
         self._recording, self._world, self._particles = stream, world, particles
-        self._laid_out = False
+        self._shown = ""
         self._draw_all_anew()
         self._draw_still()
 
     def write(self, observation: Observation) -> None:
         """Add one observation."""
         recording, grains, health = self._recording, observation.spheres, observation.health
-        if not self._laid_out:
-            blueprint = make_blueprint(self._world.scene, self._plungers, observation)
-            recording.send_blueprint(blueprint)
-            self._laid_out = True
         if observation.time < self._time:
             self._runs += 1
             self._timeline = f"{_TIMELINE}_{self._runs}"
             recording.reset_time()
             self._draw_all_anew()
+        if self._shown != self._timeline:
+            recording.send_blueprint(make_blueprint(self._world.scene, self._plungers, observation, self._timeline))
+            self._shown = self._timeline
         self._time = observation.time
         recording.set_time(self._timeline, duration=observation.time)
         recording.log(
