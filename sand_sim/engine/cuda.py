@@ -72,6 +72,7 @@ class CudaDevice:
         label: what a user is told.
         lanes: one; see ``count.Count``.
         shares: threads of a launch by ``share``.
+        portion: steps in one run at most; all that are asked for.
         threads: most threads of a launch by ``each``.
         wide: many threads work on one population at once.
         vectors: no thread does many contacts at once.
@@ -85,6 +86,7 @@ class CudaDevice:
 
     lanes = 1
     shares = _SHARES
+    portion = 2**31 - 1
     wide, vectors = True, False
 
     def __init__(self, name: str = "cuda"):
@@ -107,11 +109,12 @@ class CudaDevice:
         """Compile what is not in Warp's cache, on several threads, and load it all; nothing can be loaded while recording."""
         compile_kernels(kernels, self.name, available_cores(), progress, block_dim=_BLOCK)
 
-    def record(self, program: Callable[[CudaRecorder], None]) -> Callable[[], None]:
+    def record(self, program: Callable[[CudaRecorder], None], steps: wp.array | None = None) -> Callable[[], None]:
         """Record a program as one graph.
 
         Args:
             program: launches its stages on the recorder it is given, of kernels that have been loaded.
+            steps: of no interest here.
 
         Returns:
             A function that sets the recorded program going. Reading an array waits until it is done.

@@ -76,9 +76,12 @@ class ExplicitDem:
             UnstableError: if a velocity is no longer finite, or a grain moves more than half its radius in one step.
         """
         left = self.arrays.flags.steps_left
-        left.fill_(steps)
-        while int(left.numpy()[0]) > 0:
-            self._play(stepping=True)
+        while steps > 0:
+            portion = min(steps, self.device.portion)
+            left.fill_(portion)
+            while int(left.numpy()[0]) > 0:
+                self._play(stepping=True)
+            steps -= portion
 
     def begin(self) -> None:
         """Make this moment time zero: renew the lists and forget what has been counted and summed up."""
@@ -186,5 +189,6 @@ class ExplicitDem:
     def _program(self, record):
         """The recorded program, recorded at its first use since the arrays were last replaced."""
         if record not in self._programs:
-            self._programs[record] = self.device.record(lambda recorder: record(self.arrays, self.stages, recorder))
+            steps = self.arrays.flags.steps_done
+            self._programs[record] = self.device.record(lambda recorder: record(self.arrays, self.stages, recorder), steps)
         return self._programs[record]

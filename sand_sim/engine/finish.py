@@ -17,7 +17,8 @@ _ON_TIME = 1e-6  # of a step: a velocity that changes less than that after the s
 def build_place_tools(precision: Precision) -> wp.Kernel:
     """Kernel that puts all tools where they are at the present step, and flags the tool list if one has moved too far since.
 
-    ``travelled`` has shape (tools,): an upper bound of how far any particle of a tool has moved since the list was made [m].
+    ``travelled`` has shape (tools,): an upper bound of how far any particle of a tool has moved since the list was made [m];
+    ``since`` is the time since they were put somewhere before [s].
     """
     shape_type, state_type = tool_types(precision)
     tool_state_at = build_tool_state_at(precision)
@@ -32,6 +33,7 @@ def build_place_tools(precision: Precision) -> wp.Kernel:
         inverse_quantum: wp.float64,
         end: wp.float64,
         dt: wp.float64,
+        since: wp.float64,
         steps_done: wp.array(dtype=wp.int64),
         travelled: wp.array(dtype=wp.float64),
         skin: wp.array(dtype=wp.float64),
@@ -45,7 +47,7 @@ def build_place_tools(precision: Precision) -> wp.Kernel:
                 about = wp.vec3d(shapes[tool].arms)
                 swing = wp.dot(about, wp.vec3d(wp.abs(spin[0]), wp.abs(spin[1]), wp.abs(spin[2])))  # as ``Reach.swing``
                 swing = wp.min(swing, wp.length(spin) * wp.float64(shapes[tool].extent))
-                travelled[tool] = travelled[tool] + (wp.length(track.velocity) + swing) * dt
+                travelled[tool] = travelled[tool] + (wp.length(track.velocity) + swing) * since
                 if travelled[tool] * inverse_quantum > wp.float64(0.5) * skin[0]:
                     tools_moved[0] = 1
             states[tool] = tool_state_at(track, twist[tool, 0], twist[tool, 1], time, centre, inverse_quantum, end)

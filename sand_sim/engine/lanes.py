@@ -3,10 +3,12 @@
 Warp runs a CPU launch on one thread but releases Python's lock meanwhile. So each core gets a lane: its own recorded graph of
 launches over its share of the items, replayed by its own thread without returning to Python. Lanes meet at a barrier after each
 stage. Every item is computed by the same code in the same order whatever the number of lanes, so the results are identical.
+A thread may also play several lanes, one after the other in each stage (``crew.py``).
 """
 
 import ctypes
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 
@@ -15,6 +17,7 @@ import warp as wp
 from sampler.cores import available_cores
 from sand_sim.engine.compiling import compile_kernels
 from sand_sim.engine.count import Count
+from sand_sim.engine.crew import Crew
 from sand_sim.engine.kernel import fill_gaps, kernel
 
 _SPINS_BEFORE_YIELD = 2000
@@ -27,7 +30,7 @@ _BARRIER = """
     wp::int32* generation = meeting.data + 16;  // apart, each on a cache line of its own
     wp::int32* abandoned = meeting.data + 32;
     const wp::int32 mine = __atomic_load_n(generation, __ATOMIC_ACQUIRE);
-    if (__atomic_add_fetch(arrived, 1, __ATOMIC_ACQ_REL) == lanes) {
+    if (__atomic_add_fetch(arrived, 1, __ATOMIC_ACQ_REL) == threads) {
         __atomic_store_n(arrived, 0, __ATOMIC_RELAXED);
         __atomic_store_n(generation, mine + 1, __ATOMIC_RELEASE);
         return;
@@ -46,29 +49,30 @@ _BARRIER = """
 
 
 @wp.func_native(_BARRIER)
-def _meet(meeting: wp.array(dtype=int), lanes: int, patience: int, give_way: wp.uint64): ...
+def _meet(meeting: wp.array(dtype=int), threads: int, patience: int, give_way: wp.uint64): ...
 
 
 @kernel
-def meet(meeting: wp.array(dtype=int), lanes: int, patience: int, give_way: wp.uint64):
-    """Wait until all lanes have come here; spin for a while, then give the core to others."""
-    _meet(meeting, lanes, patience, give_way)
+def meet(meeting: wp.array(dtype=int), threads: int, patience: int, give_way: wp.uint64):
+    """Wait until all threads have come here; spin for a while, then give the core to others."""
+    _meet(meeting, threads, patience, give_way)
 
 
 class LaneRecorder:
-    """What a stage records itself on; this one keeps the share of one lane.
+    """What a stage records itself on; this one keeps the shares of the lanes that one thread plays.
 
     Attributes:
         lanes: how many there are.
-        wide: whether many threads work on one lane; here each has its own.
+        wide: whether many threads work on one lane; here each has its own, or several.
         vectors: whether a thread does many contacts at once, in vector registers.
     """
 
     wide, vectors = False, True
 
-    def __init__(self, device: "CpuDevice", lane: int):
-        self._device, self._lane = device, lane
+    def __init__(self, device: "CpuDevice", thread: int, threads: int):
+        self._device, self._threads = device, threads
         self.lanes = device.lanes
+        self._own = range(thread * self.lanes // threads, (thread + 1) * self.lanes // threads)
 
     def each(self, launched: wp.Kernel, over: Count, inputs: list, wait: bool = True) -> None:
         """Launch over all items of a population.
@@ -80,8 +84,8 @@ class LaneRecorder:
             inputs: the kernel's further arguments.
             wait: whether the lanes meet afterwards; False if the next stage touches nothing of this one.
         """
-        if over.capacity:
-            self._launch(launched, 1, [self._lane, over.spans, 1, *inputs])
+        for lane in self._own if over.capacity else ():
+            self._launch(launched, 1, [lane, over.spans, 1, *inputs])
         if wait:
             self.wait()
 
@@ -90,13 +94,14 @@ class LaneRecorder:
 
         The kernel takes ``(lane, shares, *inputs)`` and finds what share ``lane + wp.tid()`` has to do.
         """
-        self._launch(launched, 1, [self._lane, self.lanes, *inputs])
+        for lane in self._own:
+            self._launch(launched, 1, [lane, self.lanes, *inputs])
         if wait:
             self.wait()
 
     def once(self, launched: wp.Kernel, inputs: list, wait: bool = True) -> None:
         """Launch a single thread on the first lane."""
-        if self._lane == 0:
+        if 0 in self._own:
             self._launch(launched, 1, inputs)
         if wait:
             self.wait()
@@ -111,8 +116,8 @@ class LaneRecorder:
 
     def wait(self) -> None:
         """Let all lanes meet."""
-        if self.lanes > 1:
-            self._launch(meet, 1, self._device.meeting_arguments)
+        if self._threads > 1:
+            self._launch(meet, 1, self._device.meeting_arguments(self._threads))
 
     def _launch(self, launched: wp.Kernel, size: int, inputs: list) -> None:
         wp.launch(launched, dim=size, inputs=fill_gaps(launched, inputs, "cpu"), device="cpu")
@@ -127,33 +132,55 @@ class CpuDevice:
     def __init__(self, threads: int | None = None):
         self.lanes = self.shares = threads or available_cores()
         self.label = f"cpu, {self.lanes} thread{'s' if self.lanes > 1 else ''}"
-        give_way = ctypes.cast(ctypes.CDLL(None).sched_yield, ctypes.c_void_p).value
+        self._give_way = wp.uint64(ctypes.cast(ctypes.CDLL(None).sched_yield, ctypes.c_void_p).value)
         self._meeting = wp.zeros(48, dtype=int, device="cpu")
-        self.meeting_arguments = [self._meeting, self.lanes, _SPINS_BEFORE_YIELD, wp.uint64(give_way)]
         self._threads = ThreadPoolExecutor(self.lanes, thread_name_prefix="sand_sim lane")
+        self._crew = Crew(self.lanes)
+
+    def meeting_arguments(self, threads: int) -> list:
+        """What ``meet`` is given so that so many threads meet."""
+        return [self._meeting, threads, _SPINS_BEFORE_YIELD, self._give_way]
+
+    @property
+    def portion(self) -> int:
+        """Steps to take in one run at most: after them there may be more threads, or fewer."""
+        return self._crew.portion
 
     def load(self, kernels: list[wp.Kernel], progress: Callable[[str, float], None]) -> None:
         """Compile what is not in Warp's cache, on several threads, and load it all."""
         compile_kernels(kernels, "cpu", available_cores(), progress)
 
-    def record(self, program: Callable[[LaneRecorder], None]) -> Callable[[], None]:
-        """Record a program once per lane.
+    def record(self, program: Callable[[LaneRecorder], None], steps: wp.array | None = None) -> Callable[[], None]:
+        """Record a program once per thread.
 
         Args:
             program: launches its stages on the recorder it is given; it must launch the same stages whatever the lane.
+            steps: a counter that it advances, int, shape (1,); by its pace the number of threads is chosen.
 
         Returns:
             A function that runs the recorded program on all lanes and returns when it is done.
         """
-        graphs = []
-        for lane in range(self.lanes):
-            with RECORDING, wp.ScopedCapture(device="cpu") as capture:
-                program(LaneRecorder(self, lane))
-            graphs.append(capture.graph)
-        return lambda: self._run(graphs)
+        recorded: dict[int, list] = {}
+
+        def run() -> None:
+            threads = self._crew.size
+            if threads not in recorded:
+                recorded[threads] = [self._record(program, thread, threads) for thread in range(threads)]
+            before, begin = _read(steps), time.perf_counter()
+            self._run(recorded[threads])
+            seconds, done = time.perf_counter() - begin, _read(steps) - before
+            if done:
+                self._crew.note(done, seconds)
+
+        return run
 
     def synchronize(self) -> None:
         """Nothing is pending on a CPU once ``record``'s function has returned."""
+
+    def _record(self, program: Callable[[LaneRecorder], None], thread: int, threads: int):
+        with RECORDING, wp.ScopedCapture(device="cpu") as capture:
+            program(LaneRecorder(self, thread, threads))
+        return capture.graph
 
     def _run(self, graphs: list) -> None:
         running = []
@@ -165,8 +192,12 @@ class CpuDevice:
                 lane.result()
         except BaseException:
             # A lane that failed or never started would leave the others waiting for ever.
-            if len(running) < self.lanes or any(lane.done() and lane.exception() for lane in running):
+            if len(running) < len(graphs) or any(lane.done() and lane.exception() for lane in running):
                 self._meeting.numpy()[_ABANDONED] = 1
             wait(running)
             self._meeting.zero_()
             raise
+
+
+def _read(counter: wp.array | None) -> int:
+    return 0 if counter is None else int(counter.numpy()[0])

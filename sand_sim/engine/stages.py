@@ -92,7 +92,7 @@ def record_run(arrays: DemArrays, stages: Stages, recorder) -> None:
         recorder.when(flags.stepping, step, end)
 
     if arrays.tools:
-        place_tools(arrays, recorder)
+        place_tools(arrays, recorder, since=0.0)  # where the last step has left them, but others may have told them another way
     recorder.repeat(flags.running, one_step)
 
 
@@ -267,14 +267,14 @@ def finish_stage(arrays: DemArrays, recorder) -> None:
     ending = [flags.steps_done, flags.steps_left, flags.starting, flags.fault, flags.running]
     recorder.once(finish.finish_step, ending, wait=not tools)
     if tools:
-        place_tools(arrays, recorder)
+        place_tools(arrays, recorder, since=dt)
 
 
-def place_tools(arrays: DemArrays, recorder) -> None:
-    """Put the tools where their tracks have them at the present step."""
+def place_tools(arrays: DemArrays, recorder, since: float) -> None:
+    """Put the tools where their tracks have them at the present step, so much time after they were put somewhere before [s]."""
     tools, lattice, setting = arrays.tools, arrays.lattice, arrays.setting
     inputs = [tools.tracks, tools.twist, tools.shapes, tools.states, wp.vec3d(*lattice.centre), 1.0 / lattice.quantum]
-    inputs += [float(lattice.end), setting.dt, arrays.flags.steps_done, tools.travelled, arrays.skin.widest]
+    inputs += [float(lattice.end), setting.dt, since, arrays.flags.steps_done, tools.travelled, arrays.skin.widest]
     recorder.once(finish.build_place_tools(arrays.recipe.precision), [*inputs, arrays.flags.tools_moved])
 
 

@@ -20,7 +20,7 @@ class ManyThreads(CudaDevice):
         self.name = self.label = "cpu"
         self.threads, self.shares, self.eager, self.vectors = threads, shares, eager, vectors
 
-    def record(self, program):
+    def record(self, program, steps=None):
         return (lambda: program(CudaRecorder(self))) if self.eager else super().record(program)
 
 
@@ -31,7 +31,7 @@ class ShuffledThreads(ManyThreads):
         super().__init__(threads, shares, eager=True, vectors=False)
         self.random = np.random.default_rng(seed)
 
-    def record(self, program):
+    def record(self, program, steps=None):
         return lambda: program(_ShuffledRecorder(self))
 
 
