@@ -43,7 +43,7 @@ class Crew:
         self._steps += steps
         self._seconds += seconds
         pace, took = self._seconds / self._steps, self._seconds
-        hopeless = self._before is not None and pace > _HOPELESS * self._pace
+        hopeless = self._before is not None and self._steps >= _FEWEST and pace > _HOPELESS * self._pace
         if took < _WINDOW and not hopeless:
             return
         self._steps, self._seconds = 0, 0.0

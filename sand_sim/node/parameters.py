@@ -80,7 +80,7 @@ DECLARATIONS = (
     Declaration("checkpoints", False, "Keep the state from time to time, so that a crash loses little."),
     Declaration("checkpoint_period", 30.0, "Wall time between two checkpoints [s]; 0 for one each frame.", 0.0, 1.0e6),
     Declaration("resume", False, "Go on from the newest good checkpoint."),
-    Declaration("threads", 0, "Cores to use; 0 for the scene's choice, which is all by default.", 0, 4096),
+    Declaration("threads", 0, "Most cores to use; 0 for the scene's choice, which is all by default.", 0, 4096),
 )
 
 
