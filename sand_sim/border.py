@@ -141,7 +141,7 @@ class ToolReport:
         world_force: the mean force in the world frame, shape (3,) [N].
         work: of the tool on the sand since the start [J].
         carried: mass of the grains whose centres are inside the tool's bounding box [kg].
-        swept: volume of ground below the bed's first surface that the tool has passed through since the start [m^3].
+        swept: ground below the bed's first surface that it has passed through since the start, in cells a grain wide [m^3].
     """
 
     name: str
