@@ -124,8 +124,8 @@ class Assembly:
     def safe_step(self, speed: float, depth: float) -> float:
         """The step [s] that would be safe at a top speed [m/s] and an overlap over radius [1]."""
         free = replace(self.light, solver=replace(self.light.solver, time_step=None))
-        spacings = _rough_spacings(self.tools, self.grounds)
-        return choose_time_step(free, self.smallest, max(speed, self.time_step.speed), spacings, max(depth, DEEP)).safe
+        spacings, speed = _rough_spacings(self.tools, self.grounds), max(speed, self.time_step.speed)
+        return choose_time_step(free, self.smallest, speed, spacings, self.table.total_mass, max(depth, DEEP)).safe
 
 
 def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> Assembly:
@@ -194,7 +194,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         lattice,
         recipe,
         _pair_table(scene, order, precision),
-        make_plungers(walls, float(table.mass[table.lone].sum() + table.bodies.mass.sum())),
+        make_plungers(walls, table.total_mass),
         solver=None,
     )
     return replace(assembly, solver=build_solver(assembly, setting, device, progress))
@@ -276,7 +276,7 @@ def _time_step(
     """The step, shortened so that a whole number of steps makes a frame unless the scene gives it, and that number."""
     given = float(np.linalg.norm(table.velocity, axis=1).max())
     speed = fastest_speed(scene, fall_height(scene, table, walls, grounds), given)
-    chosen = choose_time_step(scene, smallest, speed, _rough_spacings(tools, grounds))
+    chosen = choose_time_step(scene, smallest, speed, _rough_spacings(tools, grounds), table.total_mass)
     frame = 1.0 / scene.frame_rate
     if scene.solver.time_step is not None:
         return chosen, max(1, round(frame / chosen.value))

@@ -85,6 +85,11 @@ class GrainTable:
         return np.where(self.lone, own, np.append(shared, 0.0)[self.body])
 
     @property
+    def total_mass(self) -> float:
+        """Mass of all grains and bodies [kg]."""
+        return float(self.mass[self.lone].sum() + self.bodies.mass.sum())
+
+    @property
     def grain(self) -> np.ndarray:
         """Number of the grain that a sphere is or belongs to, shape (n,), int."""
         begins = self.lone | (self.body != np.append([LONE], self.body[:-1]))

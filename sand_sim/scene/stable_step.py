@@ -19,6 +19,9 @@ contact is at most twice the sum of what its two partners would store in it alon
 and the same with dashpots in place of springs for c. At an immovable surface the factor 2 is missing and all N normals point the
 same way: ``w^2 <= N k/m``, with friction ``(1 + 5/2) N t k/m``.
 
+A plunger that a force moves is a mass M with as many contacts as grains can come under it. All grains, of mass m each, weigh
+s = n m/M times as much, so that it alone would have ``w^2 = s k/m``; a grain that it presses on to walls in N contacts adds N.
+
 Source: Jury 1964 (Theory and Application of the z-Transform Method); for granular networks O'Sullivan & Bray 2004,
 https://doi.org/10.1108/02644400410519794, who find 2/w of the network below that of a single contact by a factor of sqrt(N).
 """
@@ -129,7 +132,9 @@ def particles_touched(grain: float, particle: float, spacing: float, overlap: fl
     return 4.0 * math.pi / math.sqrt(3.0) * (grain + particle) * overlap / spacing**2
 
 
-def network_steps(scene: Scene, smallest: dict[str, float], spacings: Sequence[float], depth: float) -> Iterator[float]:
+def network_steps(
+    scene: Scene, smallest: dict[str, float], spacings: Sequence[float], depth: float, load: float
+) -> Iterator[float]:
     """Largest stable step of the smallest grains among their like, at walls and at the particles of tools and rough walls [s].
 
     Args:
@@ -137,6 +142,7 @@ def network_steps(scene: Scene, smallest: dict[str, float], spacings: Sequence[f
         smallest: smallest grain radius of each grain material [m].
         spacings: of the particles of each rough tool, then of each rough terrain, in the order of the scene [m].
         depth: overlap over radius up to which contacts shall be stable [1].
+        load: mass of all grains [kg].
     """
     named = {m.name: m for m in scene.materials}
     rotation = scene.contact.rotation
@@ -160,3 +166,9 @@ def network_steps(scene: Scene, smallest: dict[str, float], spacings: Sequence[f
             for stiffness, damping in (spring_and_dashpot(*contact), turning):
                 if stiffness > 0.0:
                     yield stable_step(share * stiffness / mass, share * damping / mass, scene.solver.integrator)
+        for wall in scene.boundaries:
+            if wall.drive and wall.drive.force is not None:
+                share = SURFACE_CONTACTS + load / (wall.drive.mass or load)
+                pair = pair_numbers(scene, grain, wall.material)
+                stiffness, damping = spring_and_dashpot(scene.contact, pair, radius, mass, overlap)
+                yield stable_step(share * stiffness / mass, share * damping / mass, VERLET)  # whatever moves the grains

@@ -123,7 +123,7 @@ def fastest_speed(scene: Scene, height: float, given: float) -> float:
 
 
 def choose_time_step(
-    scene: Scene, smallest: dict[str, float], speed: float, spacings: Sequence[float], depth: float = DEEP
+    scene: Scene, smallest: dict[str, float], speed: float, spacings: Sequence[float], load: float, depth: float = DEEP
 ) -> TimeStep:
     """Choose the time step, or check the one the scene gives.
 
@@ -132,6 +132,7 @@ def choose_time_step(
         smallest: smallest grain radius of each grain material [m].
         speed: fastest relative speed to expect [m/s].
         spacings: of the particles of each rough tool, then of each rough terrain, in the order of the scene [m].
+        load: mass of all grains [kg].
         depth: overlap over radius up to which contacts shall be stable [1].
 
     Raises:
@@ -151,7 +152,7 @@ def choose_time_step(
             pair = pair_numbers(scene, grain, other)
             contact = min(contact, shortest_oscillation(scene.contact, pair, half_radius, half_mass, speed))
             parting = min(parting, parting_time(cohesion, pair, radius, half_radius, half_mass))
-    stable = min(network_steps(scene, smallest, spacings, depth))
+    stable = min(network_steps(scene, smallest, spacings, depth, load))
     limits = {
         "contact time": CONTACT_FRACTION * contact,
         "Rayleigh time": RAYLEIGH_FRACTION * rayleigh,

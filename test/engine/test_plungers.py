@@ -170,6 +170,34 @@ def test_floor_carries_weight_and_the_pressing_force(make_world):
     assert health.dissipated > 0.0
 
 
+@pytest.mark.parametrize(("tangential", "restitution"), [("mindlin", 0.5), ("mindlin", 0.05), ("none", 0.05)])
+def test_a_light_lid_lies_still_on_a_layer_of_grains(make_world, tangential, restitution):
+    """A twentieth of what they weigh, it has the contacts of all of them, and yields faster than any grain.
+
+    It rattled at its top speed, which no balance of energy shows: a plunger has as much as its force gives it.
+    """
+    radius, side, overlap = 0.005, 6, 0.05  # of a radius, at rest
+    layer = np.stack(np.meshgrid(range(side), range(side), indexing="ij"), -1).reshape(-1, 2)
+    mass = 2500.0 * 4 / 3 * np.pi * radius**3 * side**2
+    force = side**2 * 4 / 3 * 1e7 / (1.0 - 0.25**2) * radius**2 * overlap**1.5
+    lid = plunger((0.0, 0.0, 2.0 * radius), (0.0, 0.0, -1.0), force=force, mass=0.0501 * mass, max_speed=1.0)
+    world = make_world(
+        2.0 * radius * np.column_stack([layer, np.full(len(layer), 0.5)]),
+        radius,
+        restitution=restitution,
+        contact={"tangential": tangential},
+        boundaries=[*floor(), lid],
+        threads=1,
+    )
+    world.step(round(0.05 / world.time_step))
+    for _ in range(10):
+        world.step(7)
+        observation = world.observe()
+        assert np.abs(observation.wall("plunger").velocity).max() < 1e-9
+        assert observation.wall("plunger").force[2] == pytest.approx(force, rel=1e-6)
+    assert observation.health.doubts == ()
+
+
 def test_floor_carries_four_sphere_grains_and_the_pressing_force(tmp_path):
     """Frictionless tetrahedra in a box: what they weigh is the mass of the union of their spheres."""
     force, low, high = 2.0, [0.0, 0.0, 0.0], [0.06, 0.06, 0.4]
