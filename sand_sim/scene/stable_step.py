@@ -39,7 +39,8 @@ from sand_sim.scene.types import SMOOTH, Scene
 
 DEEP = 0.1  # overlap over radius up to which a step shall be stable; deeper ones are reported as not to be trusted
 
-COORDINATION = 9.0  # contacts of a sphere: 6 to 7 in a jammed packing on the mean, 11 at most; 12 in a crystal
+COORDINATION = 9.0  # contacts of a sphere: 6 to 7 in a jammed packing on the mean, 11 at most
+CRYSTAL = 12.0  # the same in a crystal
 SURFACE_CONTACTS = 2.0  # a grain in a corner of three walls is no stiffer than two that face the same way
 TANGENT = 1.0  # at most: Mindlin's k_t / k_n is 2 (1 - nu)/(2 - nu)
 
@@ -146,6 +147,8 @@ def network_steps(
     """
     named = {m.name: m for m in scene.materials}
     rotation = scene.contact.rotation
+    # A crystal of Hertzian grains has its margin in that it is softer than at the depth asked for; linear springs never are.
+    contacts = CRYSTAL if "linear" in (scene.contact.normal, scene.contact.tangential) else COORDINATION
     sampled = [(tool.material, tool.particle_radius) for tool in scene.tools if tool.contact != SMOOTH]
     grounds = [(wall.material, wall.terrain) for wall in scene.boundaries if wall.terrain]
     sampled += [(material, ground.particle_radius) for material, ground in grounds if ground.contact != SMOOTH]
@@ -154,7 +157,7 @@ def network_steps(
     layers += [(wall.material, wall.rough.radius, wall.rough.spacing) for wall in scene.boundaries if wall.rough]
     for grain, radius in smallest.items():
         mass, overlap = named[grain].density * 4.0 / 3.0 * math.pi * radius**3, depth * radius
-        meetings = [(other, 0.5 * radius, 0.5 * mass, grain_share(rotation)) for other in smallest]
+        meetings = [(other, 0.5 * radius, 0.5 * mass, grain_share(rotation, contacts)) for other in smallest]
         meetings += [(wall.material, radius, mass, surface_share(rotation)) for wall in flat]
         for material, particle, spacing in layers:
             touched = max(SURFACE_CONTACTS, particles_touched(radius, particle, spacing, overlap))

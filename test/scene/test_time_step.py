@@ -7,6 +7,8 @@ from scenes import SceneMaker, floor
 from sand_sim import SceneError, World, read_scene
 from sand_sim.scene.time_step import contact_time, rayleigh_time
 from sand_sim.scene.types import Material
+from sand_sim.study.bed_cases import confined_scene
+from sand_sim.study.bench import Bench
 
 # E [Pa]: Hertz contact time of two grains of 1 mm at 0.1 m/s, Rayleigh time [s]; nu 0.25 gives the published figures.
 TIMES = {7e10: (4.9e-6, 0.52e-6), 1e9: (26.2e-6, 4.45e-6), 1e8: (65.8e-6, 14.1e-6), 1e7: (165e-6, 44.6e-6), 1e6: (415e-6, 141e-6)}
@@ -53,6 +55,20 @@ def test_frames_are_whole_numbers_of_steps(make_world):
     world = make_world([[0.0, 0.0, 0.0]], 0.005, frame_rate=50.0)
     assert world.frame_steps * world.time_step == pytest.approx(0.02, rel=1e-12)
     assert world.time_step <= world.assembly.time_step.safe
+
+
+@pytest.mark.parametrize("restitution", [0.05, 0.3])
+def test_a_crystal_on_linear_springs_comes_to_rest(tmp_path, restitution):
+    """Twelve contacts each, as stiff when they only just touch as deep down; dashpots of friction made it jitter, unseen."""
+    scene = confined_scene(Bench(tmp_path), 1e7, restitution, 50.0, 0.01)
+    scene["contact"] = {"normal": "linear", "tangential": "linear"}
+    for pair in scene["pairs"]:
+        pair |= {"stiffness": 5e3, "shear_stiffness": 5e3}
+    world = World(read_scene(scene, tmp_path))
+    world.step(8000)
+    health = world.observe().health
+    assert health.kinetic < 1e-15 * health.elastic
+    assert health.doubts == ()
 
 
 STONE = {"density": 2500.0, "young": 1e9, "poisson": 0.25}
