@@ -19,7 +19,7 @@ from sand_sim.scene.checking import odd_numbers, unused_numbers
 from sand_sim.scene.clumps import place_clumps
 from sand_sim.scene.shapes import tetrahedron
 
-_SAMPLE_EDGE = 13  # grains along each edge of the packed sample that a cost is measured on
+_SAMPLE_EDGE = 13  # grains at most along each edge of the packed sample that a cost is measured on
 _SAMPLE_STEPS, _SAMPLE_ROUNDS = 12, 10
 _OVERLAP = 0.01  # of the diameter, between neighbours in the sample
 
@@ -157,26 +157,32 @@ def measure_cost(assembly: Assembly, check: Callable[[], None] = lambda: None) -
     sample = DemArrays(recipe, replace(setting, gravity=np.zeros(3)), lattice, table, [], [], assembly.pair_table, device)
     solver = ExplicitDem(sample, device, lambda stage, share: check())
     solver.run(1)  # compiles
+    # A call takes time, too, which the steps of a run do not feel; where few grains make them short there must be more of them.
+    steps = _SAMPLE_STEPS if len(table) >= _SAMPLE_EDGE**3 else 4 * _SAMPLE_STEPS
     state, best = solver.take_state(), np.inf
     for _ in range(_SAMPLE_ROUNDS):
         check()
         solver.put_state(state)  # before the sample, which nothing holds together, has come apart
         begin = time.perf_counter()
-        solver.run(_SAMPLE_STEPS)
+        solver.run(steps)
         best = min(best, time.perf_counter() - begin)
-    return best / (_SAMPLE_STEPS * len(table))
+    return best / (steps * len(table))
 
 
 def _packed_sample(assembly: Assembly) -> GrainTable:
-    """A cube of grains that just touch their six neighbours."""
-    number, radius = _SAMPLE_EDGE**3, float(np.median(assembly.table.radius))
-    corner = np.stack(np.meshgrid(*[range(_SAMPLE_EDGE)] * 3, indexing="ij"), -1).reshape(-1, 3).astype(float)
+    """A cube of grains that just touch their six neighbours, about as many as the scene has if those are few.
+
+    What a step takes however few grains there are is then shared by as many.
+    """
+    shape, radius = tetrahedron(), float(np.median(assembly.table.radius))
+    grains = len(assembly.table) / (len(shape.radii) if assembly.recipe.bodies else 1)
+    edge = min(max(round(np.cbrt(grains)), 1), _SAMPLE_EDGE)
+    number, corner = edge**3, np.stack(np.meshgrid(*[range(edge)] * 3, indexing="ij"), -1).reshape(-1, 3).astype(float)
     still, density = np.zeros((number, 3)), float(assembly.table.density[0])
     if not assembly.recipe.bodies:
         position = corner * 2.0 * radius * (1.0 - _OVERLAP)
         columns = (np.full(number, radius), np.full(number, density), np.zeros(number, int))
         return GrainTable.of_spheres(position, still, still.copy(), *columns)
-    shape = tetrahedron()
     equal = radius * shape.equal_radius
     turns = np.tile([0.0, 0.0, 0.0, 1.0], (number, 1))
     position = corner * 2.0 * radius * (1.0 + 0.4)
