@@ -14,10 +14,13 @@ from sand_sim.world import World
 
 _TIMED = 0.1  # [s]
 _LONGEST = 10  # durations that bodies may take to part
+_ASIDE = 1e-3  # of the speed of approach: less across it, or of a rim that turns, leaves friction nothing to do
 
 
 class Impact:
     """Peak force and overlap, contact time and rebound of a normal impact without gravity.
+
+    Nothing of it shows what friction does to bodies that meet aslant or spin; without any friction they would seem right.
 
     The closed form (Johnson 1985, Contact Mechanics, section 11.4, https://doi.org/10.1017/CBO9781139171731) is that of elastic
     impacts: ``d_max = (15 m* v^2 / (16 E* sqrt(R*)))^(2/5)``, ``F_max = 4/3 E* sqrt(R*) d_max^(3/2)``,
@@ -50,17 +53,20 @@ class Impact:
         Raises:
             SceneError: if it does not hold for what the scene does.
         """
-        if scene.contact.normal != "hertz" or scene.contact.cohesion != "none":
-            return None
-        if any(scene.gravity):
+        closed = scene.contact.normal == "hertz" and scene.contact.cohesion == "none"
+        if closed and any(scene.gravity):
             raise SceneError(
                 "gravity: the closed form of an impact is that without gravity; use [0, 0, 0], or another --quantity"
             )
         world = World(scene)
         radius, mass, young, restitution = _bodies(world)
         speed = _approach(world)[1]
-        if not speed > 0.0:
+        if closed and not speed > 0.0:
             raise SceneError("fills: the grain must move towards what it hits")
+        if _aside(world) > _ASIDE * abs(speed):
+            raise SceneError("fills: an impact must be head-on, of grains that do not spin; use another --quantity, as spread")
+        if not closed:
+            return None
         values = {"rebound": np.array(restitution)}
         if restitution == 1.0:
             overlap = impact_overlap(mass, radius, young, speed)
@@ -116,6 +122,17 @@ def _approach(world: World) -> tuple[float, float]:
         gap = plane.distance(grains.position)[0] - radius[0]
         towards = -grains.velocity[0] @ plane.direction
     return float(gap), float(towards)
+
+
+def _aside(world: World) -> float:
+    """How fast bodies move past each other, or turn at their rims [m/s]."""
+    grains, radius = world.observe().grains, _radii(world)
+    if len(grains) == 2:
+        line, velocity = grains.position[1] - grains.position[0], grains.velocity[0] - grains.velocity[1]
+    else:
+        line, velocity = next(wall for wall in world.assembly.walls if wall.kind == "plane").direction, grains.velocity[0]
+    across = np.linalg.norm(np.cross(velocity, line / np.linalg.norm(line)))
+    return float(max(across, (np.linalg.norm(grains.spin, axis=1) * radius).max()))
 
 
 def _radii(world: World) -> np.ndarray:

@@ -131,3 +131,18 @@ def test_impacts_by_other_laws_have_no_closed_form(make_world, contact):
     )
     assert Impact().exact(world.scene) is None
     assert 0.3 < Impact().measure(world, lambda: None).values["rebound"] < 1.0
+
+
+@pytest.mark.parametrize("contact", [{}, {"normal": "linear"}])
+@pytest.mark.parametrize("bodies", ["plane", "pair"])
+@pytest.mark.parametrize("motion", [{"velocity": [0.1, 0, -0.2]}, {"velocity": [0, 0, -0.2], "spin": [0, 20, 0]}])
+def test_impacts_in_which_friction_matters_are_refused(make_world, contact, bodies, motion):
+    """The rebound does not show it: without any friction, which would be recommended, it is the same."""
+    position, boundaries = [[0, 0, 0.0051]], [{"type": "plane", "material": "wall", "point": [0, 0, 0], "normal": [0, 0, 1]}]
+    if bodies == "pair":
+        position, boundaries = [[0, 0, 0.0101], [0, 0, 0]], []
+        motion = {name: [value, [0.0, 0.0, 0.0]] for name, value in motion.items()}
+    numbers = {"stiffness": 1e4}
+    world = make_world(position, 0.005, contact=contact, numbers=numbers, boundaries=boundaries, duration=0.005, **motion)
+    with pytest.raises(SceneError, match="an impact must be head-on, of grains that do not spin; use another --quantity"):
+        Impact().exact(world.scene)
