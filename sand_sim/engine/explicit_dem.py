@@ -189,6 +189,7 @@ class ExplicitDem:
     def _program(self, record):
         """The recorded program, recorded at its first use since the arrays were last replaced."""
         if record not in self._programs:
-            steps = self.arrays.flags.steps_done
-            self._programs[record] = self.device.record(lambda recorder: record(self.arrays, self.stages, recorder), steps)
+            arrays, stages = self.arrays, self.stages  # the program must not hold the solver, which holds it
+            steps = arrays.flags.steps_done
+            self._programs[record] = self.device.record(lambda recorder: record(arrays, stages, recorder), steps)
         return self._programs[record]
