@@ -14,7 +14,7 @@ from sand_sim.node.parameters import Parameters
 from sand_sim.node.rate import Rate
 from sand_sim.scene.types import Boundary
 from sand_sim.scene.walls import Wall, walls_of
-from sand_sim.sinks.wall_mesh import is_floor, plane_outline, wall_mesh
+from sand_sim.sinks.wall_mesh import in_outline, plane_outline, wall_mesh
 from sand_sim.tool_model import ToolModel
 from sand_sim.world import World
 
@@ -84,7 +84,7 @@ class ShapeOutputs:
     def _wall(self, wall: Wall, place: np.ndarray) -> Marker:
         """A wall with its point in a place."""
         lattice, name, frame = self._world.assembly.lattice, f"boundaries/{wall.name}", self._parameters["frame_id"]
-        if wall.kind == "plane" and not is_floor(wall, self._world.scene.gravity):
+        if in_outline(wall, self._world.scene.gravity):
             corners = plane_outline(wall, lattice.low, lattice.high) + place
             return self._lines(np.stack([corners, np.roll(corners, -1, axis=0)], axis=1), name)
         corners, triangles = wall_mesh(wall, lattice.low, lattice.high)

@@ -10,7 +10,7 @@ from sand_sim.border import Observation
 from sand_sim.scene.walls import Wall, walls_of
 from sand_sim.sinks.blueprint import make_blueprint, series_styles
 from sand_sim.sinks.colours import colour_by_speed, fastest_shown
-from sand_sim.sinks.wall_mesh import is_floor, plane_outline, wall_mesh
+from sand_sim.sinks.wall_mesh import in_outline, plane_outline, wall_mesh
 from sand_sim.tool_model import ToolModel
 from sand_sim.world import World
 
@@ -117,7 +117,7 @@ class Drawing:
     def _wall(self, wall: Wall) -> rr.Mesh3D | rr.LineStrips3D:
         """A wall around its point."""
         low, high = self._world.assembly.lattice.low, self._world.assembly.lattice.high
-        if wall.kind == "plane" and not is_floor(wall, self._world.scene.gravity):
+        if in_outline(wall, self._world.scene.gravity):
             corners = plane_outline(wall, low, high)
             return rr.LineStrips3D([np.concatenate([corners, corners[:1]])], colors=[[150, 150, 160]])
         corners, triangles = wall_mesh(wall, low, high)

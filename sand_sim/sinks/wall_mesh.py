@@ -9,9 +9,9 @@ _SECTIONS = 64
 _FLOOR = 0.5  # cosine of the slope up to which a plane is a floor
 
 
-def is_floor(wall: Wall, gravity: tuple[float, float, float]) -> bool:
-    """Whether a plane bears what lies on it; of others only the outline is drawn, as several would hide the grains."""
-    return bool(-wall.direction @ np.array(gravity) > _FLOOR * np.linalg.norm(gravity))
+def in_outline(wall: Wall, gravity: tuple[float, float, float]) -> bool:
+    """Whether only the outline of a wall is drawn: of planes that bear nothing, as several would hide the grains."""
+    return wall.kind == "plane" and not -wall.direction @ np.array(gravity) > _FLOOR * np.linalg.norm(gravity)
 
 
 def wall_mesh(wall: Wall, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Worlds of free rigid bodies."""
+"""Worlds of free rigid bodies, and on devices of our own."""
 
 import pytest
 from body_worlds import MATERIALS
@@ -24,3 +24,15 @@ def make_bodies(tmp_path):
         return World(read_scene(parsed | further, tmp_path))
 
     return make
+
+
+@pytest.fixture
+def with_device(monkeypatch):
+    """``with_device(device, make)`` makes a world on a device of our own."""
+
+    def made(device, make):
+        with monkeypatch.context() as patch:
+            patch.setattr("sand_sim.assemble.open_device", lambda name, threads: device)
+            return make()
+
+    return made

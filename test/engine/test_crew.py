@@ -4,7 +4,7 @@ from itertools import cycle
 
 import numpy as np
 import pytest
-from kinds import KINDS, flying_grains
+from kinds import KINDS, flying_grains, same_state
 from scenes import write_small_scene
 
 from sand_sim import ToolPose, World, load_scene
@@ -96,27 +96,21 @@ class Turns:
         self.size = next(self._sizes)
 
 
-def same_state(monkeypatch, make):
-    """A world on one thread, and one on threads whose number changes every seven steps, come to the same bits."""
-    states = []
-    for device in (CpuDevice(1), Changing()):
-        monkeypatch.setattr("sand_sim.assemble.open_device", lambda name, threads, device=device: device)
-        world = make()
+def on_one_and_on_changing(with_device, make):
+    """The same world on one thread and on threads whose number changes every seven steps."""
+    worlds = [with_device(device, make) for device in (CpuDevice(1), Changing())]
+    for world in worlds:
         world.step(400)
-        states.append(world.save())
-    active = int(states[0]["grains.number"])
-    for name, value in states[0].items():
-        cut = (slice(active if name.startswith("grains.") else None),) if value.ndim else ()
-        np.testing.assert_array_equal(value[cut], states[1][name][cut], name)
+    return worlds
 
 
 @pytest.mark.parametrize("case", KINDS)
-def test_same_bits_whatever_the_number_of_threads(make_world, monkeypatch, case):
-    same_state(monkeypatch, lambda: flying_grains(make_world, case))
+def test_same_bits_whatever_the_number_of_threads(make_world, with_device, case):
+    same_state(*on_one_and_on_changing(with_device, lambda: flying_grains(make_world, case)))
 
 
 @pytest.mark.parametrize(("contact", "height"), [("rough", 0.0249), ("smooth", 0.0219)])
-def test_same_bits_at_a_tool_whatever_the_number_of_threads(tmp_path, monkeypatch, contact, height):
+def test_same_bits_at_a_tool_whatever_the_number_of_threads(tmp_path, with_device, contact, height):
     plate = {"mesh": "plate.stl", "material": "steel", "particle_radius": 0.003, "pose": {"position": [0.015, 0.015, height]}}
     scene = load_scene(write_small_scene(tmp_path, tools={"plate": plate | {"contact": contact, "max_speed": 1.0}}))
 
@@ -127,4 +121,4 @@ def test_same_bits_at_a_tool_whatever_the_number_of_threads(tmp_path, monkeypatc
         assert len(world.tool_contacts("plate").overlap)
         return world
 
-    same_state(monkeypatch, pressed)
+    same_state(*on_one_and_on_changing(with_device, pressed))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import warp as wp
-from kinds import KINDS, flying_grains
+from kinds import KINDS, flying_grains, same_state
 from many_threads import ManyThreads, ShuffledThreads
 from scenes import write_small_scene
 
@@ -17,31 +17,6 @@ from sand_sim.engine.device import open_device
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.lanes import CpuDevice
 from sand_sim.scene.types import SceneError
-
-
-@pytest.fixture
-def with_device(monkeypatch):
-    """``with_device(device, make)`` makes a world on a device of our own."""
-
-    def made(device, make):
-        with monkeypatch.context() as patch:
-            patch.setattr("sand_sim.assemble.open_device", lambda name, threads: device)
-            return make()
-
-    return made
-
-
-def same_state(a, b):
-    """All of both states is equal to the bit, but for grains that have retired, whose order is of no interest."""
-    kept_a, kept_b = a.save(), b.save()
-    assert kept_a.keys() == kept_b.keys()
-    active = int(kept_a["grains.number"])
-    for name, value in kept_a.items():
-        of_grains = name.startswith("grains.") and value.ndim
-        cut = slice(active if of_grains else None)
-        np.testing.assert_array_equal(
-            value[cut] if value.ndim else value, kept_b[name][cut] if value.ndim else kept_b[name], name
-        )
 
 
 @pytest.mark.parametrize("eager", [False, True])
