@@ -4,6 +4,7 @@ import numpy as np
 
 from sand_sim.assemble import Assembly, fall_height
 from sand_sim.clearance import find_obstacles
+from sand_sim.contact_reading import observe_grain_contacts
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.engine.reviving import revive
 from sand_sim.observing import observe_grains, observe_spheres, outer_force
@@ -12,6 +13,9 @@ from sand_sim.tool_model import Progress
 
 _CHUNKS = 50
 _BORNE = 0.02  # share of the weight by which what bears a bed at rest may differ from it
+_PERCHED = 0.02  # share of the grains that may stand on one other in a bed that has collapsed from its lattice
+_UPRIGHT = 0.9  # cosine of the angle from the vertical at which a grain stands on another, not leans on it and on a wall
+_TOPPLED = 10.0  # times sqrt(d/g): whoever stands askew by a twentieth of d has by then rolled off what it stood on
 _FALL = 0.3  # of the speed at which the highest grain would end its fall
 _THROWN = 10.0  # times the speed of a bed at rest: grains that are given more are meant to fly
 _SLOWED = 0.2  # share of the time in which drag slows grains down, after which it is applied anew
@@ -69,6 +73,7 @@ def _come_to_rest(assembly: Assembly, doubts: tuple[str, ...], progress: Progres
     turning = 2.0 * asked.speed / gravity if gravity else 0.0  # so long grains that begin to fall or turn are slow
     drag = _drag(assembly, gravity)
     part = min(chunk, max(1, round(_SLOWED / drag / step))) if drag else chunk
+    toppling = _TOPPLED * np.sqrt(2.0 * np.mean(assembly.table.radius) / gravity) if gravity else 0.0
     slow = 0.0
     for done in range(_CHUNKS):
         try:
@@ -89,8 +94,15 @@ def _come_to_rest(assembly: Assembly, doubts: tuple[str, ...], progress: Progres
         progress("settling", (done + 1) / _CHUNKS)
         slow = slow + chunk * step if speed < asked.speed else 0.0
         if slow > turning and unborne < _BORNE:  # a soft bed springs slowly
-            progress("settling", 1.0)
-            return []
+            perched = _perched(assembly) if slow < toppling else 0.0
+            if perched < _PERCHED:
+                progress("settling", 1.0)
+                return []
+    if slow > turning and unborne < _BORNE:
+        return [
+            f"settle: grains are slow after {asked.time:g} s, but {100.0 * perched:.2g} % of them stand on one other and may "
+            "roll off it; give it more time"
+        ]
     if slow > turning:
         return [
             f"settle: grains are slow after {asked.time:g} s, but what bears them differs from their weight by "
@@ -100,6 +112,18 @@ def _come_to_rest(assembly: Assembly, doubts: tuple[str, ...], progress: Progres
         f"settle: grains still move at {speed:.2g} m/s (root mean square) after {asked.time:g} s, speed {asked.speed:g} m/s was "
         "asked; give it more time or ask for less"
     ]
+
+
+def _perched(assembly: Assembly) -> float:
+    """Share of the grains that touch one other only, which bears them.
+
+    A few layers stay the columns of the lattice that they began in for a while, slower than asked, until those roll off.
+    """
+    contacts, down = observe_grain_contacts(assembly), np.asarray(assembly.scene.gravity, float)
+    steepness = contacts.normal @ down / np.linalg.norm(down)
+    touching = np.bincount(np.concatenate([contacts.first, contacts.second]), minlength=assembly.table.grains)
+    upper = np.concatenate([contacts.first[steepness < -_UPRIGHT], contacts.second[steepness > _UPRIGHT]])
+    return float(np.sum(touching[upper] == 1) / len(observe_grains(assembly)))
 
 
 def _thrown(assembly: Assembly) -> np.ndarray:

@@ -175,3 +175,25 @@ def test_what_happens_before_time_zero_counts_for_nothing_afterwards(make_world)
     assert health.retired == 0
     assert abs(health.dissipated) < 1e-9 * weight
     assert health.doubts == ()
+
+
+def few_layers(tmp_path, **settle):
+    scene = SceneMaker(tmp_path).scene([[0.0, 0.0, 0.0]], 0.002, gravity=[0.0, 0.0, -GRAVITY], precision="single")
+    region = {"low": [-0.02, -0.02, 0.0], "high": [0.02, 0.02, 0.2]}
+    scene["fills"] = [{"material": "grain", "radius": 0.002, "region": region, "count": 200}]
+    sides = {"type": "box", "name": "bin", "material": "wall", "low": region["low"], "high": region["high"], "open": ["top"]}
+    return World(read_scene(scene | {"boundaries": [sides], "settle": {"speed": 0.01} | settle}, tmp_path))
+
+
+def test_a_few_layers_rest_when_their_columns_have_toppled(tmp_path):
+    """Grains of a lattice that stand on one another are slow at first, too, and sank by a fifth of a diameter in rest."""
+    world = few_layers(tmp_path, time=2.0)
+    assert world.warnings == []
+    start = world.observe().grains.position[:, 2].mean()
+    world.step(round(0.3 / world.time_step))
+    assert start - world.observe().grains.position[:, 2].mean() < 0.05 * 0.004
+
+
+def test_a_bed_that_still_stands_in_columns_when_its_time_ends_is_told(tmp_path):
+    (warning,) = few_layers(tmp_path, time=0.06, fall=0.05).warnings
+    assert "stand on one other" in warning
