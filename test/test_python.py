@@ -1,6 +1,7 @@
 """A world as programs use it: what makes no sense is refused in words, and a scene can be handed on."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -80,3 +81,11 @@ def test_the_scene_of_a_world_goes_to_other_processes(world):
         here.reset()
         here.step(50)
     assert np.array_equal(world.observe().grains.position, again.observe().grains.position)
+
+
+def test_a_scene_may_have_gravity_as_numpy_gives_it(tmp_path):
+    """Whether velocities carry over is a choice of the kernels, which take Python's own ``bool`` alone."""
+    scene = load_scene(write_small_scene(tmp_path))
+    world = World(replace(scene, gravity=tuple(np.array([0.5, 0.0, -9.8]))))
+    world.step(1)
+    assert world.steps == 1

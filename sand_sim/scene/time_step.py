@@ -197,7 +197,7 @@ def loses_digits(scene: Scene, time_step: TimeStep, precision: Precision, smalle
     if scene.contact.twisting != "none":
         allowed += [_RESISTED * slowing for slowing in _slowing_by_twisting(scene, smallest, whole)]
     least = min((share for share in allowed if share > 0.0), default=np.inf)
-    return 0.5 * precision.epsilon * max(time_step.speed, rim) > least * time_step.value
+    return bool(0.5 * precision.epsilon * max(time_step.speed, rim) > least * time_step.value)  # not NumPy's
 
 
 def _slowing_by_twisting(scene: Scene, smallest: dict[str, float], gravity: float) -> list[float]:
