@@ -28,13 +28,13 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _execute(arguments: list[str] | None, interruption: Interruption) -> int:
     from sand_sim.checkpoint import CheckpointError
-    from sand_sim.cli import bench, demo, pareto, plan, play, run, stability
+    from sand_sim.cli import bench, demo, pareto, plan, play, repose, run, stability
     from sand_sim.scene.types import SceneError
 
     parser = argparse.ArgumentParser(prog="sand_sim", description=(__doc__ or "").partition(": ")[2])
     parser.add_argument("--version", action=_Version, nargs=0, help="tell the version")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
-    for verb in (run, demo, play, plan, pareto, stability, bench):
+    for verb in (run, demo, play, plan, repose, pareto, stability, bench):
         name = verb.__name__.rsplit(".", 1)[-1]
         first = (verb.__doc__ or "").partition("\n")[0]  # there are none under python -OO
         one = verbs.add_parser(name, help=first, description=first)
