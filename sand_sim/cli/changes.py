@@ -47,7 +47,7 @@ def apply_edits(variation: Variation, parsed: dict, facts: Facts | None = None) 
         return variation.apply(parsed, facts)
     except (KeyError, ValueError, TypeError, AttributeError) as error:
         paths = ", ".join(edit.path for edit in variation.edits)
-        raise SceneError(f"cannot change {paths} in this scene: {error!r}") from None
+        raise SceneError(f"cannot change {paths} in this scene: {error}") from None
 
 
 def _edit(text: str) -> Edit:
@@ -55,9 +55,12 @@ def _edit(text: str) -> Edit:
     if not sign or not path or not value:
         raise argparse.ArgumentTypeError(f"must be PATH=VALUE, got '{text}'")
     try:
-        return Edit(path, to(_from_here(path, yaml.safe_load(value))))
+        parsed = yaml.safe_load(value)
     except yaml.YAMLError:
-        raise argparse.ArgumentTypeError(f"must be PATH=VALUE with a value as in a scene file, got '{text}'") from None
+        parsed = None
+    if parsed is None:  # which would leave the entry alone
+        raise argparse.ArgumentTypeError(f"must be PATH=VALUE with a value as in a scene file, got '{text}'")
+    return Edit(path, to(_from_here(path, parsed)))
 
 
 def _from_here(path: str, value: Any) -> Any:

@@ -176,8 +176,12 @@ def _change(node: Any, keys: list[str], change: Change, facts: Facts) -> None:
         for inner in node.values() if isinstance(node, dict) else node or ():
             _change(inner, rest, change, facts)
         return
+    if not isinstance(node, dict | list):
+        raise ValueError(f"'{key}' is asked of {node}, which has no entries")
+    if isinstance(node, list) and not (key.isdecimal() and int(key) < len(node)):
+        raise ValueError(f"'{key}' is none of the numbers from 0 to {len(node) - 1}")
     place = int(key) if isinstance(node, list) else key
-    present = place < len(node) if isinstance(node, list) else place in node
+    present = isinstance(node, list) or place in node
     if rest:
         there = present and node[place] is not None  # a section may be left empty
         inner = node[place] if there else {}

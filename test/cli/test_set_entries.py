@@ -47,12 +47,20 @@ def test_files_are_those_of_the_working_folder_or_beside_the_scene(tmp_path, mon
     [
         ("materials.sand.density=heavy", r"small\.yaml: materials\.sand\.density: must be a number"),
         ("tools.plate.mehs=mine.stl", r"small\.yaml: tools\.plate.*'mehs'"),
-        ("duration.more=1", r"cannot change duration\.more in this scene"),
+        ("duration.more=1", r"cannot change duration\.more in this scene: 'more' is asked of 0\.4, which has no entries"),
+        ("fills.1.radius=0.004", r"cannot change fills\.1\.radius in this scene: '1' is none of the numbers from 0 to 0"),
+        ("pairs.sand.friction=0.4", r"cannot change pairs\.sand\.friction .*: 'sand' is none of the numbers from 0 to \d"),
     ],
 )
 def test_a_wrong_change_is_refused_by_name(tmp_path, word, message):
     with pytest.raises(SceneError, match=message):
         changed(write_small_scene(tmp_path), word)
+
+
+def test_a_change_to_nothing_is_refused(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        changed(write_small_scene(tmp_path), "tools=null")
+    assert "tools=null" in capsys.readouterr().err
 
 
 def test_a_scene_that_cannot_be_read_is_refused_before_it_is_changed(tmp_path):
