@@ -21,6 +21,7 @@ _JITTER = 0.4  # of the gap
 _FINEST = 4  # halvings of a place of the lattice
 _SPARE = 100  # places beyond what is needed, because chance deals them out
 _MOST_PLACES = 30_000_000  # in a region: 3 GB while they are laid out, and many times what a bed has been run with
+_HIGHER = 10.0  # times, beyond which a region is most likely meant otherwise
 _POURED_FRACTION = 0.61  # of solid in a settled bed, a little high so that a fill by height can be struck off
 # What files of grains hold: arrays of an npz file, and the columns of a csv file that make them.
 _COLUMNS = {
@@ -76,9 +77,11 @@ def fill_grains(
         raise SceneError(f"fills: '{fill.name}' shares too large a region with other fills: {error}") from None
     if wanted > room:
         cause = "".join(f"; {what} takes {some} of its {places} places" for what, some in taken if 2 * some > places)
+        times = wanted / room + 0.1 if room and not cause else np.inf
+        enough = f", about {times:.1f} times as high," if times < _HIGHER else ""
         raise SceneError(
             f"fills: '{fill.name}' has room for {room} loosely packed grains but {wanted} are wanted{cause}; "
-            "enlarge 'region' or ask for fewer grains"
+            f"enlarge 'region'{enough} or ask for fewer grains"
         )
     turns = rotation.at_random(wanted, random) if shape else None
     return _table(position, radius, fill, material, index, shape, turns)

@@ -1,6 +1,7 @@
 """How grains get into a scene."""
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -153,6 +154,15 @@ def test_grains_too_fine_for_their_region_are_refused(radius):
 def test_too_many_grains_are_refused():
     with pytest.raises(SceneError, match=r"'bed' has room for \d+ loosely packed grains but 100000 are wanted"):
         fill_grains(fill(count=100_000), SAND, 0, [])
+
+
+def test_a_region_as_high_as_is_told_has_room_for_the_bed():
+    bed = fill(size=SizeDistribution("constant", mean=0.005), low=(0.0, 0.0, 0.0), high=(0.1, 0.1, 0.1), height=0.08)
+    with pytest.raises(SceneError, match=r"enlarge 'region', about [\d.]+ times as high, or ask for fewer") as refused:
+        fill_grains(bed, SAND, 0, [])
+    times = float(re.search(r"about ([\d.]+) times", str(refused.value)).group(1))
+    assert times < 5.0
+    assert len(fill_grains(replace(bed, high=(0.1, 0.1, 0.1 * times)), SAND, 0, []))
 
 
 def test_what_takes_the_room_of_the_grains_is_named(tmp_path):
