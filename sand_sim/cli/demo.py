@@ -20,7 +20,9 @@ _PATIENCE = 20.0  # [s] for a process to end by itself after it was asked to
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("scene", nargs="?", default="dig", help="scene file or name (default: dig)")
-    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for recording, history, summary and figure")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out"), help="folder for recording, history, summary and figure (default: out)"
+    )
     parser.add_argument("--view", action="store_true", help="open the Rerun viewer")
 
 

@@ -29,7 +29,9 @@ from sand_sim.study.variation import Edit, Facts, Variation, to
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("scene", help="scene file, or the name of one of the package's own: impact, column and dig are ready")
-    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for NAME_pareto.json and NAME_pareto.png")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out"), help="folder for NAME_pareto.json and NAME_pareto.png (default: out)"
+    )
     defaults = ", ".join(f"{percent(value)} for {name}" for name, value in TOLERANCES.items()).replace("%", "%%")
     parser.add_argument("--tolerance", type=positive, help=f"largest relative error that will do, as 0.05 (default: {defaults})")
     parser.add_argument("--repeats", type=count, help="runs of each setting (default: 3, of one impact 8, with --quick 2)")
@@ -37,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="fewer settings, of a shorter run where the scene is one of ours")
     parser.add_argument("--quantity", choices=QUANTITIES, help="what is compared; chosen from the scene if left out")
     changes.add_argument(parser, " before it is varied")
-    parser.add_argument("--threads", type=count, help="cores to use; all if left out")
+    parser.add_argument("--threads", type=count, help="most cores to use; the scene's choice if left out")
 
 
 def execute(options: argparse.Namespace, interruption: Interruption) -> int:

@@ -26,10 +26,12 @@ from sand_sim.world import World
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("scene", help="scene file, or the name of one of the package's own, such as dig")
-    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for recording, history, summary and figure")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out"), help="folder for recording, history, summary and figure (default: out)"
+    )
     changes.add_argument(parser)
     parser.add_argument("--duration", type=positive, help="simulated seconds; the scene's own if left out")
-    parser.add_argument("--threads", type=count, help="cores to use; all if left out")
+    parser.add_argument("--threads", type=count, help="most cores to use; the scene's choice if left out")
     parser.add_argument("--checkpoint", type=Path, metavar="FOLDER", help="keep the state there, so that a crash loses little")
     parser.add_argument("--checkpoint-period", type=float, metavar="S", help=f"wall seconds, default {PERIOD:g}")
     parser.add_argument("--resume", action="store_true", help="go on from the newest good checkpoint in that folder")

@@ -12,7 +12,9 @@ from sand_sim.study.stability import sweep, table_text
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for stability.json and stability.png")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out"), help="folder for stability.json and stability.png (default: out)"
+    )
     parser.add_argument("--quick", action="store_true", help="fewer cases and a coarser map")
     parser.add_argument("--json", action="store_true", help="print the findings as JSON instead of a table")
 
