@@ -38,7 +38,11 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
-        print(f"sand_sim: arguments after --ros-args: {' '.join(str(error).split())}", file=sys.stderr)
+        told = " ".join(str(error).split())
+        if "logging directory" in told:
+            print(f"sand_sim: ROS cannot start: {told}; set HOME or ROS_LOG_DIR", file=sys.stderr)
+        else:
+            print(f"sand_sim: arguments after --ros-args: {told}", file=sys.stderr)
         return 1
     executor, node, code = SingleThreadedExecutor(), None, 0
     try:

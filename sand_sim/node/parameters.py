@@ -184,7 +184,8 @@ class Parameters(Mapping):
         except InvalidParameterTypeException as error:
             hint = ", such as 10.0" if isinstance(declaration.default, float) else ""
             kind = Parameter.Type.from_parameter_value(declaration.default).name.lower().replace("_", " ")
-            raise ValueError(f"parameter {declaration.name}: must be a {kind}{hint}; {error}") from None
+            article = "an" if kind.startswith("int") else "a"
+            raise ValueError(f"parameter {declaration.name}: must be {article} {kind}{hint}; {error}") from None
         self._declarations[declaration.name] = declaration
         self._values[declaration.name] = self._node.get_parameter(declaration.name).value
 

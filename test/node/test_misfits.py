@@ -1,5 +1,7 @@
 """Partners that do not fit are told how to mend it: quality of service, types, sources, clocks; start-up arguments, too."""
 
+import os
+import re
 import subprocess
 import sys
 import threading
@@ -111,6 +113,7 @@ def test_the_advice_on_quality_of_service_helps(client, start_node):
     ("arguments", "named"),
     [
         (["-p", "points_rate:=10"], "parameter points_rate: must be a double, such as 10.0"),
+        (["-p", "threads:=2.0"], "parameter threads: must be an integer; "),
         (["-p", "points_fields:=[x, y, z]"], "arguments after --ros-args: failed to initialize rcl: Couldn't parse parameter"),
         (
             ["-p", "qos_overrides./clock.publisher.reliability:=sloppy"],
@@ -126,6 +129,15 @@ def test_bad_arguments_end_the_start_with_one_line_of_ours(tmp_path, arguments, 
     assert done.returncode == 1
     assert [line for line in done.stderr.splitlines() if line.startswith("sand_sim: ") and named in line], done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_log_without_a_place_is_no_fault_of_the_arguments():
+    """Services of the system are started without a HOME."""
+    bare = {name: value for name, value in os.environ.items() if name not in ("HOME", "ROS_HOME", "ROS_LOG_DIR")}
+    command = [sys.executable, "-m", "sand_sim.node"]
+    done = subprocess.run(command, env=bare, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert done.returncode == 1
+    assert re.search(r"^sand_sim: ROS cannot start: .* logging directory.*; set HOME or ROS_LOG_DIR$", done.stderr, re.MULTILINE)
 
 
 def test_dumped_parameters_can_be_read_again(ros, start_node, tmp_path):
