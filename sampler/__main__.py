@@ -13,12 +13,12 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command line.
 
     Returns:
-        0; 1 where the mesh or an option cannot be used; 130 where the user stopped it.
+        0; 1 where the mesh, an option or a folder cannot be used; 130 where the user stopped it.
     """
     options = _parser().parse_args(arguments)
     try:
         return _run(options)
-    except MeshError as error:
+    except (MeshError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

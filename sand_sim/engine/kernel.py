@@ -6,10 +6,7 @@ import warp as wp
 
 from sampler.quiet import start_warp
 
-try:
-    start_warp()
-except OSError as error:  # users in containers often have no home
-    raise OSError(f"compiled kernels cannot be kept: {error}; set WARP_CACHE_PATH to a folder that can be written") from None
+start_warp()
 
 # Fused multiply-add makes the contact kernels a tenth faster; Warp's own flags leave it to the back end, which finds few.
 _OPTIONS = {"cpu_compiler_flags": f"{wp.config.cpu_compiler_flags} -ffp-contract=fast"}

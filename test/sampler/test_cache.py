@@ -220,3 +220,13 @@ def test_output_that_nobody_reads_is_no_error(buffered):
     places = {**os.environ, "PYTHONUNBUFFERED": buffered}
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, env=places)
     assert not done.stderr
+
+
+def test_a_folder_for_kernels_that_cannot_be_made_is_told(tmp_path):
+    (tmp_path / "file").touch()
+    environment = os.environ | {"WARP_CACHE_PATH": str(tmp_path / "file")}
+    command = [sys.executable, "-m", "sampler", str(BUCKET), "--radius", "0.01"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: compiled kernels cannot be kept: [Errno 20] Not a directory")
+    assert done.stderr.endswith("; set WARP_CACHE_PATH to a folder that can be written\n")
