@@ -9,6 +9,10 @@ _USAGE = (
     "usage: sand_sim_node --ros-args -p scene:=FILE [-p NAME:=VALUE ...] [--params-file FILE] [-r __node:=NAME] ...; "
     "docs/node.md tells the parameters, and ros2 param describe those of a running node"
 )
+_ELSEWHERE = {
+    "logging directory": "; set HOME or ROS_LOG_DIR",
+    "SECURITY": "",
+}  # why else ROS may not start, hints
 _SWITCH_INTERVAL = 5e-5  # [s] that Python's threads wait for each other; with the usual 5 ms stepping waits for messages
 
 
@@ -29,6 +33,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         from sand_sim.node.node import SandSimNode
         from sand_sim.node.preparing import Preparation
+        from sand_sim.node.security import demand_security
         from sand_sim.node.transport import enlarge_shared_memory
         from sand_sim.scene.types import SceneError
     except OSError as error:  # of the folder for compiled kernels
@@ -36,13 +41,16 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     enlarge_shared_memory()
     try:
+        demand_security()
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    except SceneError as error:
+        print(f"sand_sim: {error}", file=sys.stderr)
+        return 1
     except RuntimeError as error:
         told = " ".join(str(error).split())
-        if "logging directory" in told:
-            print(f"sand_sim: ROS cannot start: {told}; set HOME or ROS_LOG_DIR", file=sys.stderr)
-        else:
-            print(f"sand_sim: arguments after --ros-args: {told}", file=sys.stderr)
+        hint = next((hint for cause, hint in _ELSEWHERE.items() if cause in told), None)
+        where = "arguments after --ros-args" if hint is None else "ROS cannot start"
+        print(f"sand_sim: {where}: {told}{hint or ''}", file=sys.stderr)
         return 1
     executor, node, code = SingleThreadedExecutor(), None, 0
     try:

@@ -14,6 +14,7 @@ from rosgraph_msgs.msg import Clock
 from msg_adapters.builtin_interfaces import stamp_to_time
 from msg_adapters.geometry_msgs import command_to_pose
 from sand_sim.interruption import Interruption
+from sand_sim.node.security import demand_security
 from sand_sim.playing import commands_at, driven_tools, frame_times
 from sand_sim.scene.types import Scene, SceneError
 
@@ -36,7 +37,7 @@ def play(scene: Scene, target: str, frame_id: str, clock_topic: str, interruptio
 
     Raises:
         SceneError: if there is nothing to play, no node can have that name, simulated time is past all of it, or the node has
-            gone before the end.
+            gone before the end; or as ``demand_security``.
     """
     driven = driven_tools(scene)
     for option, name, topic in (("--node", target, f"/{target}"), ("--clock", clock_topic, clock_topic)):
@@ -44,6 +45,7 @@ def play(scene: Scene, target: str, frame_id: str, clock_topic: str, interruptio
             validate_full_topic_name(topic)
         except NameValidationException as error:
             raise SceneError(f"{option} '{name}': {' '.join(str(error).split())}") from None
+    demand_security()
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("sand_sim_player")
     try:

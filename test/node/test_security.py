@@ -13,21 +13,44 @@ pytestmark = pytest.mark.xdist_group("processes")
 from node_client import PATIENCE
 from scenes import write_small_scene
 
+from sand_sim.cli.main import main
+
 GUIDE = Path(__file__).parents[2] / "docs" / "security.md"
+UNAVAILABLE = "^sand_sim: ROS cannot start: .*SECURITY|^sand_sim: ROS_SECURITY_KEYSTORE: |doesn't have the security libraries"
 
 
-def test_asked_for_security_and_cannot_have_it(start_process, tmp_path, monkeypatch):
-    """The keystore holds no enclave, and the wheels have no security to begin with."""
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ({"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}, UNAVAILABLE),
+        ({"ROS_SECURITY_ENABLE": "true"}, UNAVAILABLE),
+        ({"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "enforce"}, "^sand_sim: ROS_SECURITY_STRATEGY: .* 'enforce'"),
+        ({"ROS_SECURITY_ENABLE": "True", "ROS_SECURITY_STRATEGY": "Enforce"}, "^sand_sim: ROS_SECURITY_ENABLE: .* 'True'"),
+    ],
+)
+@pytest.mark.parametrize("keystore", ["keys", "nowhere", None])
+def test_asked_for_security_and_cannot_have_it(start_process, tmp_path, monkeypatch, given, named, keystore):
+    """The keystore holds no enclave, is not there or not named, and the wheels have no security to begin with.
+
+    ROS itself runs unprotected, and says nothing, in all of these cases but the first.
+    """
     (tmp_path / "keys" / "enclaves").mkdir(parents=True)
-    monkeypatch.setenv("ROS_SECURITY_ENABLE", "true")
-    monkeypatch.setenv("ROS_SECURITY_STRATEGY", "Enforce")
-    monkeypatch.setenv("ROS_SECURITY_KEYSTORE", str(tmp_path / "keys"))
+    monkeypatch.delenv("ROS_SECURITY_STRATEGY", raising=False)
+    monkeypatch.delenv("ROS_SECURITY_KEYSTORE", raising=False)
+    for name, value in (given | ({"ROS_SECURITY_KEYSTORE": str(tmp_path / keystore)} if keystore else {})).items():
+        monkeypatch.setenv(name, value)
     write_small_scene(tmp_path)
     process = start_process(scene="small.yaml", duration=0.1, pacing="fast")
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert "is ready" not in errors
-    assert "secur" in errors.lower()
+    assert re.search(named, errors, re.MULTILINE), errors
+
+
+def test_the_player_asks_for_it_as_the_node_does(monkeypatch, tmp_path, capsys):
+    monkeypatch.setenv("ROS_SECURITY_ENABLE", "True")
+    assert main(["play", str(write_small_scene(tmp_path))]) == 1
+    assert "sand_sim: ROS_SECURITY_ENABLE: " in capsys.readouterr().err
 
 
 def test_policy_names_what_there_is(client, start_node):
