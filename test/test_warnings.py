@@ -23,6 +23,10 @@ LIQUID = {"bridge_volume": 0.01}
             ["pairs: 'rolling_friction' has no effect; .* would have to say rolling: constant, or rolling: spring$"],
         ),
         ({"numbers": {"rolling_friction": 0.0}}, []),  # as much as says that there is none
+        (
+            {"numbers": {"rolling_friction": 20.0}, "contact": {"rolling": "constant"}},
+            ["pairs: 'grain' and '(grain|wall)' have a rolling_friction of 20; it is the tangent of an angle, not the"] * 2,
+        ),
         ({"friction": 4.0, "material": {"density": 12.0, "young": 1e7, "poisson": 0.25}}, []),
         (
             {"friction": 35.0},

@@ -56,17 +56,18 @@ def check_scene(scene: Scene) -> None:
                 raise SceneError(f"domain: must contain the region of fill '{fill.name}', its grains would be retired at once")
 
 
-# From where on another unit is more likely meant: friction, density [kg/m^3], Young's modulus [Pa], surface tension [N/m] and
-# adhesion [J/m^2]; molten metals pull with up to 2.5 N/m.
+# From where on another unit is more likely meant: friction and rolling friction, density [kg/m^3], Young's modulus [Pa], surface
+# tension [N/m] and adhesion [J/m^2]; molten metals pull with up to 2.5 N/m.
 _STEEP, _LIGHT, _SOFT, _TENSE, _STICKY = 5.0, 10.0, 1.0e3, 5.0, 10.0
 
 
 def odd_numbers(scene: Scene) -> list[str]:
     """Numbers that are possible, but more likely in another unit."""
-    steep = [(rule.between, rule.numbers.get("friction", 0.0)) for rule in scene.pairs]
+    names = ("friction", "rolling_friction")
+    steep = [(rule.between, name, rule.numbers.get(name, 0.0)) for rule in scene.pairs for name in names]
     told = [
-        f"pairs: '{a}' and '{b}' have a friction of {value:g}; it is the tangent of an angle, not the angle"
-        for (a, b), value in steep
+        f"pairs: '{a}' and '{b}' have a {name} of {value:g}; it is the tangent of an angle, not the angle"
+        for (a, b), name, value in steep
         if value >= _STEEP
     ]
     sticky = [(rule.between, rule.numbers.get("adhesion", 0.0)) for rule in scene.pairs]
