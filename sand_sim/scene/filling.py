@@ -293,10 +293,11 @@ def _read_arrays(path: Path) -> dict[str, np.ndarray]:
 def _read_csv(path: Path) -> dict[str, np.ndarray]:
     with path.open(newline="", encoding="utf-8-sig") as file:
         rows = list(csv.DictReader(file, restkey="", restval=""))
+    known = sum(_COLUMNS.values(), ())
     if not rows:
-        return {}
+        raise ValueError(f"it has no line below the first, which names the columns: {', '.join(known)}")
     names = {name.strip(): name for name in rows[0]}
-    _refuse_unknown(names, sum(_COLUMNS.values(), ()))
+    _refuse_unknown(names, known)
     columns = {}
     for key, wanted in _COLUMNS.items():
         missing = [name for name in wanted if name not in names]

@@ -331,6 +331,8 @@ def test_unreadable_position_files_are_refused(tmp_path, name, content):
         ("x,y,z,radius,vx,vz\n0,0,0,0.005,1,2\n", "it lacks vy"),
         ("x,y,z,radius,vx,vy,Vz\n0,0,0,0.005,1,2,3\n", "unknown column 'Vz'"),
         ("x,y,z,radius\n0,0,0,0.005,1\n", "unknown column ''"),
+        ("x,y,z,radius\n", "no line below the first, which names the columns: x, y, z, radius"),
+        ("0,0,0,0.005\n", "no line below the first, which names the columns: x, y, z, radius"),
         ("0.1,-0.2,0,0.005\n0,0,0,0.005\n", "the first line, with 0.1 in it, must name the columns; known are x, y, z, radius"),
     ],
 )
