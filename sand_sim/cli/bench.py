@@ -12,7 +12,7 @@ from pathlib import Path
 
 from sampler.cores import available_cores
 from sand_sim.cli.console import Console
-from sand_sim.cli.writing import check_file
+from sand_sim.cli.writing import check_file, place
 from sand_sim.interruption import InterruptedByUserError, Interruption
 from sand_sim.scene.types import SceneError
 
@@ -24,11 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("cases", nargs="*", metavar="CASE", help="see --list; W1-8000, W1-32000, W2 and W3 if left out")
     parser.add_argument("--list", action="store_true", help="name the cases")
-    parser.add_argument("--beds", type=Path, help="folder with settled beds, bed_8000.xyz and so on; settled here if left out")
+    parser.add_argument("--beds", type=place, help="folder with settled beds, bed_8000.xyz and so on; settled here if left out")
     parser.add_argument("--threads", type=int, nargs="+", metavar="N", help="numbers of cores; 1 and all if left out")
     parser.add_argument("--rounds", type=int, default=5, help="how often everything runs in turn (default: %(default)s)")
     parser.add_argument("--work", type=float, default=3e7, help="spheres times steps of one run (default: %(default)s)")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="append the lines to this file, too")
+    parser.add_argument("--out", type=place, metavar="FILE", help="append the lines to this file, too")
 
 
 def execute(options: argparse.Namespace, interruption: Interruption) -> int:

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from sand_sim.cli.writing import make_folder
+from sand_sim.cli.writing import make_folder, place
 from sand_sim.config_folder import find_scene
 from sand_sim.interruption import Interruption
 from sand_sim.playing import driven_tools
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("scene", nargs="?", default="dig", help="scene file or name (default: dig)")
     parser.add_argument(
-        "--out", type=Path, default=Path("out"), help="folder for recording, history, summary and figure (default: out)"
+        "--out", type=place, default=Path("out"), help="folder for recording, history, summary and figure (default: out)"
     )
     parser.add_argument("--view", action="store_true", help="open the Rerun viewer")
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from sand_sim.cli import changes
 from sand_sim.cli.console import Console
 from sand_sim.cli.numbers import count, positive
-from sand_sim.cli.writing import check_file, make_folder
+from sand_sim.cli.writing import check_file, make_folder, place
 from sand_sim.config_folder import find_scene
 from sand_sim.interruption import InterruptedByUserError, Interruption
 from sand_sim.scene.reading import load_scene, parse_scene
@@ -30,12 +30,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("scene", help="scene file, or the name of one of the package's own: impact, column and dig are ready")
     parser.add_argument(
-        "--out", type=Path, default=Path("out"), help="folder for NAME_pareto.json and NAME_pareto.png (default: out)"
+        "--out", type=place, default=Path("out"), help="folder for NAME_pareto.json and NAME_pareto.png (default: out)"
     )
     defaults = ", ".join(f"{percent(value)} for {name}" for name, value in TOLERANCES.items()).replace("%", "%%")
     parser.add_argument("--tolerance", type=positive, help=f"largest relative error that will do, as 0.05 (default: {defaults})")
     parser.add_argument("--repeats", type=count, help="runs of each setting (default: 3, of one impact 8, with --quick 2)")
-    parser.add_argument("--write", type=Path, metavar="FILE", help="write the scene, else unchanged, with what is recommended")
+    parser.add_argument("--write", type=place, metavar="FILE", help="write the scene, else unchanged, with what is recommended")
     parser.add_argument("--quick", action="store_true", help="fewer settings, of a shorter run where the scene is one of ours")
     parser.add_argument("--quantity", choices=QUANTITIES, help="what is compared; chosen from the scene if left out")
     changes.add_argument(parser, " before it is varied")

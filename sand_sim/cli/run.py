@@ -12,7 +12,7 @@ from sand_sim.checkpoints import PERIOD, CheckpointFolder
 from sand_sim.cli import changes
 from sand_sim.cli.console import Console
 from sand_sim.cli.numbers import count, positive
-from sand_sim.cli.writing import make_folder
+from sand_sim.cli.writing import make_folder, place
 from sand_sim.config_folder import find_scene
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.interruption import Interruption
@@ -27,12 +27,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("scene", help="scene file, or the name of one of the package's own, such as dig")
     parser.add_argument(
-        "--out", type=Path, default=Path("out"), help="folder for recording, history, summary and figure (default: out)"
+        "--out", type=place, default=Path("out"), help="folder for recording, history, summary and figure (default: out)"
     )
     changes.add_argument(parser)
     parser.add_argument("--duration", type=positive, help="simulated seconds; the scene's own if left out")
     parser.add_argument("--threads", type=count, help="most cores to use; the scene's choice if left out")
-    parser.add_argument("--checkpoint", type=Path, metavar="FOLDER", help="keep the state there, so that a crash loses little")
+    parser.add_argument("--checkpoint", type=place, metavar="FOLDER", help="keep the state there, so that a crash loses little")
     parser.add_argument("--checkpoint-period", type=float, metavar="S", help=f"wall seconds, default {PERIOD:g}")
     parser.add_argument("--resume", action="store_true", help="go on from the newest good checkpoint in that folder")
     parser.add_argument("--view", action="store_true", help="open the Rerun viewer")

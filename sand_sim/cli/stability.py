@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 from sand_sim.cli.console import Console
-from sand_sim.cli.writing import make_folder
+from sand_sim.cli.writing import make_folder, place
 from sand_sim.interruption import Interruption
 from sand_sim.study.stability import sweep, table_text
 
@@ -13,7 +13,7 @@ from sand_sim.study.stability import sweep, table_text
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument(
-        "--out", type=Path, default=Path("out"), help="folder for stability.json and stability.png (default: out)"
+        "--out", type=place, default=Path("out"), help="folder for stability.json and stability.png (default: out)"
     )
     parser.add_argument("--quick", action="store_true", help="fewer cases and a coarser map")
     parser.add_argument("--json", action="store_true", help="print the findings as JSON instead of a table")

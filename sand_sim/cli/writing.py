@@ -1,9 +1,15 @@
 """Where results go: seen to before the work, not when all has been done."""
 
 import os
+from os.path import expanduser  # unlike that of Path it leaves a home that nobody knows as it is
 from pathlib import Path
 
 from sand_sim.scene.types import SceneError
+
+
+def place(text: str) -> Path:
+    """A path, also one with ``~``, which shells leave as it is in ``--out=~/out``."""
+    return Path(expanduser(text))
 
 
 def make_folder(folder: Path, option: str = "--out") -> None:

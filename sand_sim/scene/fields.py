@@ -3,6 +3,8 @@
 import difflib
 import math
 from collections.abc import Callable, Iterable
+from os.path import expanduser  # unlike that of Path it leaves a home that nobody knows as it is
+from pathlib import Path
 from typing import Any
 
 from sand_sim.scene.types import SceneError
@@ -84,6 +86,10 @@ class Field:
         if not isinstance(self.value, str) or not self.value:
             raise self.refuse(f"must be a text, got {_shown(self.value)}")
         return self.value
+
+    def file(self, folder: Path) -> Path:
+        """The path of a file; relative ones start at a folder."""
+        return folder / expanduser(self.text())
 
     def yes_or_no(self) -> bool:
         """True or false."""

@@ -50,7 +50,7 @@ def read_body(name: str, entry: Field, folder: Path) -> Body:
 
 def _spheres(entry: Field, folder: Path) -> Path | tuple[tuple[float, ...], ...]:
     if isinstance(entry.value, str):
-        return folder / entry.text()
+        return entry.file(folder)
     rows = tuple(row.vector(4) for row in entry.entries())
     if not rows or any(row[3] <= 0.0 for row in rows):
         raise entry.refuse("must be a file, or at least one row [x, y, z, radius] with a positive radius [m]")

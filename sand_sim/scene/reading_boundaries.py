@@ -146,7 +146,7 @@ def _terrain(entry: Field, folder: Path) -> Terrain:
         return Terrain(mesh=entry["mesh"].text(), **common)
     if "spacing" not in entry:
         raise entry.refuse("the field 'spacing' [m], of the grid of heights, is missing")
-    path = folder / entry["heights"].text()
+    path = entry["heights"].file(folder)
     if path.suffix.lower() not in _HEIGHT_FILES:
         raise entry["heights"].refuse(f"must be a file of type {', '.join(_HEIGHT_FILES)}, got '{path.name}'")
     return Terrain(heights=path, spacing=_length(entry["spacing"]), **common)

@@ -35,13 +35,13 @@ def read_fill(entry: Field, folder: Path) -> Fill:
     return Fill(
         name=entry.optional("name", Field.text, entry.path),
         material=entry["material"].text(),
-        shape=entry.optional("shape", lambda f: f.text() if f.value in (SPHERE, TETRAHEDRON) else folder / f.text(), SPHERE),
+        shape=entry.optional("shape", lambda f: f.text() if f.value in (SPHERE, TETRAHEDRON) else f.file(folder), SPHERE),
         size=entry.optional("radius", _size, None),
         low=low,
         high=high,
         count=entry.optional("count", lambda f: f.whole(1), None),
         height=entry.optional("height", lambda f: f.number(above=0.0, unit="m"), None),
-        file=entry.optional("file", lambda f: folder / f.text(), None),
+        file=entry.optional("file", lambda f: f.file(folder), None),
         velocity=entry.optional("velocity", Field.vector, (0.0, 0.0, 0.0)),
         seed=entry.optional("seed", lambda f: f.whole(0), 0),
     )

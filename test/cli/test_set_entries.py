@@ -42,6 +42,23 @@ def test_files_are_those_of_the_working_folder_or_beside_the_scene(tmp_path, mon
         assert (found.folder / found.tools[0].mesh).samefile(path)
 
 
+def test_files_of_ones_home_are_found(tmp_path, monkeypatch):
+    """No shell makes a path of ~ where it stands in a scene file, or behind a sign of equality."""
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.chdir(tmp_path)
+    scene = write_small_scene(tmp_path)
+    for name in ("plate.stl", "bed.npz"):
+        shutil.move(tmp_path / name, home / name)
+    assert load_scene(scene).fills[0].file == tmp_path / "bed.npz"
+    words = ["--set", "tools.plate.mesh=~/plate.stl", "--set", "fills.0.file=~/bed.npz", "--duration=0.02"]
+    assert main(["run", "small.yaml", *words, "--out=~/out", "--checkpoint=~/states"]) == 0
+    assert (home / "out" / "small.json").is_file()
+    assert list((home / "states").iterdir())
+    assert not (tmp_path / "~").exists()
+
+
 @pytest.mark.parametrize(
     ("word", "message"),
     [
