@@ -1,5 +1,6 @@
 """Progress on the console: one line that is written over on a terminal, now and then a line elsewhere."""
 
+import errno
 import os
 import sys
 import time
@@ -30,19 +31,26 @@ class Console:
         now = time.monotonic()
         if self._stream.isatty():
             columns = os.get_terminal_size(self._stream.fileno()).columns  # 0 where that is not known
-            print(f"\r\x1b[K{text[: columns - 1] if columns else text}", end="", file=self._stream, flush=True)
+            self._print(f"\r\x1b[K{text[: columns - 1] if columns else text}", end="")
             self._open = True
         elif force or now - self._shown > _EVERY:
-            print(text, file=self._stream, flush=True)
+            self._print(text)
             self._shown = now
 
     def tell(self, text: str) -> None:
         """Show a line that stays, whole, in place of progress that may stand there."""
-        print(f"\r\x1b[K{text}" if self._stream.isatty() else text, file=self._stream, flush=True)
+        self._print(f"\r\x1b[K{text}" if self._stream.isatty() else text)
         self._open = False
 
     def end(self) -> None:
         """Leave the line as it stands."""
         if self._open:
-            print(file=self._stream)
+            self._print("")
             self._open = False
+
+    def _print(self, text: str, end: str = "\n") -> None:
+        try:
+            print(text, end=end, file=self._stream, flush=True)
+        except OSError as error:
+            if error.errno != errno.EIO:  # of a terminal that has just been closed, which ``Interruption`` sees to
+                raise

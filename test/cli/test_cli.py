@@ -180,6 +180,31 @@ def test_ctrl_c_keeps_what_was_recorded(tmp_path):
     assert "written: results/dig.rrd" in output
 
 
+@pytest.mark.parametrize("before", [[], ["nohup"]])
+def test_a_terminal_that_is_closed_ends_a_run_as_ctrl_c_does(tmp_path, before):
+    """As that of a remote login that breaks off; the results were lost, and what is told afterwards finds no terminal."""
+    write_small_scene(tmp_path)
+    command = [*before, sys.executable, "-m", "sand_sim", "run", "small.yaml", "--duration", "1" if before else "1000"]
+    leader, follower = os.openpty()
+    take = "import os, sys; os.open(sys.argv[1], os.O_RDWR); os.execvp(sys.argv[2], sys.argv[2:])"  # it is the session's
+    process = subprocess.Popen(
+        [sys.executable, "-c", take, os.ttyname(follower), *command],
+        cwd=tmp_path,
+        stdin=follower,
+        stdout=follower,
+        stderr=follower,
+        start_new_session=True,
+    )
+    os.close(follower)
+    end = time.monotonic() + PATIENCE
+    while not (tmp_path / "out" / "small.rrd").exists() and time.monotonic() < end:
+        if not before:  # nohup writes to a file
+            os.read(leader, 100_000)
+    os.close(leader)  # which hangs up
+    assert process.wait(timeout=PATIENCE) == (0 if before else 130)
+    assert json.loads((tmp_path / "out" / "small.json").read_text())["interrupted"] == (not before)
+
+
 def test_a_run_without_rerun_says_so_before_the_work_and_goes_on(tmp_path):
     (tmp_path / "without" / "rerun").mkdir(parents=True)
     (tmp_path / "without" / "rerun" / "__init__.py").write_text("raise ImportError('not there')")

@@ -54,6 +54,22 @@ def test_progress_is_one_line_that_does_not_wrap(terminal, columns, seen):
     assert screen(read()) == [seen * "3", ""]
 
 
+def test_a_terminal_that_has_just_gone_is_no_error(monkeypatch):
+    """Before the signal of it is looked at."""
+    leader, follower = os.openpty()
+    stream = os.fdopen(follower, "w")
+    monkeypatch.setattr(sys, "stderr", stream)
+    console = Console()
+    console.line("progress")
+    os.close(leader)
+    console.line("progress", force=True)
+    console.tell("a word")
+    console.end()
+    monkeypatch.undo()
+    with contextlib.suppress(OSError):
+        stream.close()
+
+
 def test_what_is_told_stays_whole(terminal):
     """The next progress wrote over a warning of the time step."""
     read, console = terminal(80), Console()
