@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fill", help="name of the grains; the first if left out")
     parser.add_argument("--repeats", type=count, default=2, help="beds that differ by chance (default: 2)")
     changes.add_argument(parser)
-    parser.add_argument("--threads", type=count, help="cores to use; all if left out")
+    parser.add_argument("--threads", type=count, help="most cores to use; the scene's choice if left out")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
