@@ -12,7 +12,7 @@ _MARK = b"\xef\xbb\xbf"  # of UTF-8, which some editors put first
 _BESIDE = re.compile(rb"(?<=\d)/\S*")
 _POLYGON = re.compile(rb"\nf((?: +\d\S*){4,}) *\r?(?=\n)")
 _VERTEX = re.compile(rb"\nv +(\S+) +(\S+) +(\S+)")
-_ODD = re.compile(rb"\n(?:[ \t]+[vf]|[vf]n?\t|f[^\n-]*-)")  # indented, followed by a tab, counted backwards
+_ODD = re.compile(rb"\n(?: +[vf]|f[^\n-]*-)")  # indented, counted backwards
 
 
 def bare_obj(name: str, data: bytes) -> bytes:
@@ -40,13 +40,13 @@ def _plain(data: bytes) -> bytes:
     Indices below zero count back from their line; trimesh counts them back from the end of the file.
 
     Returns:
-        The data with a line break before it, so that every line follows one.
+        The data with a line break before and after it, so that every line follows one and ends with one.
     """
-    data = b"\n" + data.removeprefix(_MARK)
+    data = b"\n" + data.removeprefix(_MARK) + b"\n"
     continued = b"\\\n" in data or b"\\\r" in data
     broken = b"\r" in data and data.count(b"\r") != data.count(b"\r\n")
     remarks = any(data[data.rfind(b"\n", 0, found.start()) + 1] in b"vf" for found in re.finditer(rb"#[^\n]*", data))
-    if not (continued or broken or remarks or _ODD.search(data)):
+    if not (continued or broken or remarks or b"\t" in data or _ODD.search(data)):
         return _without_hollow_polygons(data)
     data = re.sub(rb"#[^\r\n]*", b"", data)
     lines, vertices = [b""], 0

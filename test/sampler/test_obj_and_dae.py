@@ -30,18 +30,34 @@ def test_indices_of_obj_count_back_from_their_line(tmp_path):
     assert read_mesh(tmp_path / "apart.obj").volume == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("written", ["{0}", "{0}/1/1", "{0}//1"])
-@pytest.mark.parametrize("first", range(6))
-def test_hollow_polygons_of_obj_do_not_reach_over_their_edge(tmp_path, first, written):
+def angle_obj(first, written="{0}"):
+    """A prism over a polygon that is not convex, whose last face it is, too."""
     angle = np.roll([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], first, axis=0)
     sides = [(k, (k + 1) % 6, (k + 1) % 6 + 6, k + 6) for k in range(6)]
     vertices = [f"v {x} {y} {z}" for z in (0, 1) for x, y in angle]
-    faces = [" ".join(["f", *(written.format(k + 1) for k in face)]) for face in ([*range(5, -1, -1)], [*range(6, 12)], *sides)]
-    (tmp_path / "angle.obj").write_text("\n".join([*vertices, "vt 0 0", "vn 0 0 1", *faces, ""]))
+    faces = [" ".join(["f", *(written.format(k + 1) for k in face)]) for face in (*sides, [*range(5, -1, -1)], [*range(6, 12)])]
+    return "\n".join([*vertices, "vt 0 0", "vn 0 0 1", *faces, ""])
+
+
+@pytest.mark.parametrize("written", ["{0}", "{0}/1/1", "{0}//1"])
+@pytest.mark.parametrize("first", range(6))
+def test_hollow_polygons_of_obj_do_not_reach_over_their_edge(tmp_path, first, written):
+    (tmp_path / "angle.obj").write_text(angle_obj(first, written))
     mesh = read_mesh(tmp_path / "angle.obj")
     assert len(mesh.faces) == 20
     assert mesh.area == pytest.approx(14.0)
     assert mesh.volume == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [(r"\n\Z", ""), (r"(?<=\d) (?=\d)", "\t"), (r"(?<=\d)\n", "\t\n"), (r"(v \d) ", r"\1\t")],
+    ids=["no-last-break", "tabs-between", "tabs-at-the-end", "a-tab-in-vertices"],
+)
+@pytest.mark.parametrize("first", range(6))
+def test_hollow_polygons_of_obj_are_found_however_lines_are_written(tmp_path, first, old, new):
+    (tmp_path / "angle.obj").write_text(re.sub(old, new, angle_obj(first)))
+    assert read_mesh(tmp_path / "angle.obj").area == pytest.approx(14.0)
 
 
 def test_an_index_of_obj_that_counts_back_too_far_is_refused(tmp_path):
