@@ -3,11 +3,13 @@
 import numpy as np
 import warp as wp
 
-from sampler.topology import edges_of, link_items
+from sampler.surface import Surface
+from sampler.topology import Edges, edges_of, link_items
 
 _FARTHEST = 2e-3  # of the diagonal
 _SHARE = 0.25  # of the length of open edges and of the height of triangles over them; more would close triangles
 _ROUNDS = 4
+_OPPOSED = -0.7  # cosine between normals from which two holes of one surface are in the two skins of a wall
 
 
 @wp.func
@@ -60,7 +62,7 @@ def sew_edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Vertex that each vertex is joined with, itself in most cases, shape (n,).
 
     First those at the ends of open edges that lie beside one another, then single ones at open edges, as where a long edge meets
-    two short ones; only over a small part of the length of those edges.
+    two short ones; only over a small part of the length of those edges. Holes in the two skins of a thin wall are no crack.
 
     Args:
         vertices: shape (n, 3) [m].
@@ -77,6 +79,7 @@ def sew_edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
         face, corner = np.divmod(edges.half[rim], 3)
         corners = same[faces[face[:, None], (corner[:, None] + np.arange(3)) % 3]]  # the open edge's, then the opposite one
         links = (_vertex_links if turn else _edge_links)(vertices, corners, diagonal)
+        links = links[~_through_walls(vertices, same[faces], edges, face, corners[:, :2], links)]
         if len(links):
             group, _, _ = link_items(len(vertices), *links.T)
             first = np.full(int(group.max()) + 1, -1)
@@ -116,6 +119,27 @@ def _vertex_links(vertices: np.ndarray, corners: np.ndarray, diagonal: float) ->
     partner = _ask(find_partner_vertex, [_vectors(points)], np.minimum(_FARTHEST, _SHARE * shortest[open_] / diagonal))
     found = np.flatnonzero(partner >= 0)
     return np.stack([open_[found], open_[partner[found]]], axis=1)
+
+
+def _through_walls(vertices, faces, edges: Edges, face: np.ndarray, ends: np.ndarray, links: np.ndarray) -> np.ndarray:
+    """Whether links join two holes of one surface whose faces, turned to agree with one another, look opposite ways; shape (k,).
+
+    Open edges are those of faces with such numbers, shape (n,), between such vertices, shape (n, 2).
+    """
+    pair = edges.of(2)
+    turn = edges.forward[pair[:, 0]] == edges.forward[pair[:, 1]]
+    part, turned, _ = link_items(len(faces), *edges.face[pair].T, turn)
+    hole, _, _ = link_items(len(vertices), *ends.T)
+    of_vertex = np.full(len(vertices), -1)
+    of_vertex[ends] = part[face, None]
+    through = (of_vertex[links[:, 0]] == of_vertex[links[:, 1]]) & (hole[links[:, 0]] != hole[links[:, 1]])
+    if through.any():
+        upward, normal = Surface.normals_of(vertices[faces[face]]), np.zeros((len(vertices), 3))
+        for k in (0, 1):
+            np.add.at(normal, ends[:, k], np.where(turned[face, None], -upward, upward))
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+        through &= np.einsum("ij,ij->i", *normal[links.T]) < _OPPOSED
+    return through
 
 
 def _ask(kernel, inputs: list[wp.array], reach: np.ndarray) -> np.ndarray:

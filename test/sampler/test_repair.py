@@ -100,6 +100,25 @@ def test_cracks_are_sewn_in_their_middle():
     assert off.max() < 1e-12
 
 
+@pytest.mark.parametrize("damage", ["beside one another", "opposite", "hole"])
+def test_the_skins_of_a_thin_plate_are_not_sewn_to_each_other(damage):
+    """Where each of them lacks a triangle at one corner, or what is around it."""
+    plate = trimesh.creation.box((1.0, 1.0, 1.0))
+    for _ in range(3):
+        plate = plate.subdivide()
+    place, gone = (0.25, 0.25), []
+    for side in (1.0, -1.0):
+        away = plate.triangles_center[:, :2] - place
+        away[plate.face_normals[:, 2] * side < 0.5] = np.inf
+        near = np.argsort(np.linalg.norm(away, axis=1))[:6]  # around the corner
+        forth = away[near, 0] * (side if damage == "beside one another" else 1.0)
+        gone += [*near] if damage == "hole" else [near[forth.argmax()]]
+    plate.apply_scale((1.0, 1.0, 1e-3))
+    repaired = repair_mesh(trimesh.Trimesh(plate.vertices, np.delete(plate.faces, gone, axis=0), process=False))
+    assert repaired.report.steps["holes closed"] == 2
+    assert integrate(repaired.triangles)[0] == pytest.approx(1e-3, rel=1e-12)
+
+
 @pytest.mark.parametrize("share", [0.01, 0.04])
 def test_needles_that_fell_apart_are_not_sewn_flat(share):
     pipe = trimesh.creation.cylinder(radius=0.1, height=5.0, sections=64)
