@@ -50,7 +50,13 @@ def integrate(triangles: np.ndarray, share: np.ndarray | float = 1.0) -> tuple[f
         return 0.0, origin, np.full((3, 3), np.nan)
     centre = first / volume
     second = corners - volume * np.outer(centre, centre)
-    return volume, origin + centre, np.trace(second) * np.eye(3) - second
+    return volume, origin + centre, inertia_of(second)
+
+
+def inertia_of(second: np.ndarray) -> np.ndarray:
+    """Inertia from the second moments ``integral x x^T dV``; what one leaves of their trace would be off for needles."""
+    moments = np.diag(second)
+    return np.diag(np.roll(moments, 1) + np.roll(moments, 2)) - second * (1.0 - np.eye(3))
 
 
 def openness(triangles: np.ndarray, share: np.ndarray | float = 1.0) -> float:
@@ -98,7 +104,7 @@ def count_inside(surface: Surface) -> tuple[float, np.ndarray, np.ndarray]:
     spread = np.einsum("n,ni,nj->ij", share, place - centre, place - centre)
     larger = side[:, 0] > 1.5 * size[0] / _ACROSS
     spread += np.diag(share[larger] @ side[larger] ** 2) / 12.0  # that of places at random is in them
-    return volume, centre, np.trace(spread) * np.eye(3) - spread
+    return volume, centre, inertia_of(spread)
 
 
 def joined(bodies: list[tuple[float, np.ndarray, np.ndarray]]) -> tuple[float, np.ndarray, np.ndarray]:
@@ -110,7 +116,7 @@ def joined(bodies: list[tuple[float, np.ndarray, np.ndarray]]) -> tuple[float, n
     inertia = np.zeros((3, 3))
     for one, middle, own in bodies:
         away = middle - centre
-        inertia += (own if one else 0.0) + one * (away @ away * np.eye(3) - np.outer(away, away))
+        inertia += (own if one else 0.0) + one * inertia_of(np.outer(away, away))
     return volume, centre, inertia
 
 

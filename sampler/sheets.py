@@ -3,7 +3,7 @@
 import numpy as np
 
 from sampler.caps import close_holes
-from sampler.mass import joined
+from sampler.mass import inertia_of, joined
 from sampler.repair import SHEET, RepairedMesh
 from sampler.skin import Skin
 from sampler.surface import Surface
@@ -64,7 +64,7 @@ def plates_outside(triangles: np.ndarray, thickness: float, solid: Surface) -> t
         return joined([])
     centre = places.mean(axis=0)
     spread = one * (places - centre).T @ (places - centre)
-    return one * len(places), centre, np.trace(spread) * np.eye(3) - spread
+    return one * len(places), centre, inertia_of(spread)
 
 
 def thicken(vertices: np.ndarray, faces: np.ndarray, thickness: float) -> tuple[np.ndarray, np.ndarray]:

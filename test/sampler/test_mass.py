@@ -39,6 +39,15 @@ def test_solids_are_joined_as_if_they_were_one():
     assert joined([])[0] == 0.0
 
 
+def test_the_inertia_of_needles_about_their_length_is_exact():
+    for sections in (6, 24):
+        radius, step = 5e-4, 2.0 * np.pi / sections
+        volume, _, inertia = integrate(np.asarray(trimesh.creation.cylinder(radius, 1.0, sections=sections).triangles))
+        area = 0.5 * sections * radius**2 * np.sin(step)
+        assert volume / area == pytest.approx(1.0, abs=1e-13)
+        assert inertia[2, 2] / (area * radius**2 * (2.0 + np.cos(step)) / 6.0) == pytest.approx(1.0, abs=1e-13)
+
+
 def test_principal_axes_are_a_right_handed_rotation():
     random = np.random.default_rng(4)
     for _ in range(20):
