@@ -4,6 +4,7 @@ import argparse
 import signal
 import sys
 import time
+from os.path import exists, isdir, isfile  # unlike those of Path they raise nothing where a folder may not be looked into
 from pathlib import Path
 
 from sampler.errors import MeshError
@@ -44,12 +45,16 @@ def _run(options: argparse.Namespace) -> int:
         check_weight(options.density, options.mass)
     path = locate_mesh(options.mesh)
     for written in (options.output, options.rrd):
-        if written and not written.parent.is_dir():
+        if written and not isdir(written.parent):
             raise MeshError(f"cannot write {written}: there is no folder {written.parent}")
-        if written and written.is_dir():
+        if written and isdir(written):
             raise MeshError(f"cannot write {written}: it is a folder; name a file in it")
-        if written and written.exists() and written.samefile(path):
+        if written and exists(written) and not isfile(written):
+            raise MeshError(f"cannot write {written}: it is no file")
+        if written and exists(written) and written.samefile(path):
             raise MeshError(f"cannot write {written}: it is the mesh; name another file")
+    if options.rrd and options.output and options.rrd.resolve() == options.output.resolve():
+        raise MeshError(f"cannot write {options.output}: it is named twice")
     recording = None
     if options.rrd:
         from sampler.recording import Recording

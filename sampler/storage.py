@@ -3,6 +3,7 @@
 import os
 import tempfile
 from dataclasses import astuple, fields
+from os.path import exists, isfile
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,8 @@ def save_body(path: str | Path, body: ParticleBody) -> None:
         MeshError: if the file cannot be written.
     """
     path = Path(path)
+    if exists(path) and not isfile(path):  # a device, which a file would be put in place of
+        raise MeshError(f"body {path}: cannot be written: it is no file")
     arrays = {f.name: getattr(body, f.name) for f in fields(body) if f.name not in ("evenness", "steps", *_TEXTS)}
     arrays["evenness"] = np.array(astuple(body.evenness))
     arrays["step_names"] = np.array(list(body.steps), dtype=np.str_)

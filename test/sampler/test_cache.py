@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sampler import MeshError, load_body, sample_file, sample_mesh
+from sampler import MeshError, load_body, sample_file, sample_mesh, save_body
 from sampler.cache import cache_folder
 
 BUCKET = Path(__file__).parents[2] / "config" / "meshes" / "bucket.stl"
@@ -192,6 +192,23 @@ def test_command_line_refuses_with_one_line_before_the_work(folder, arguments, r
     (line,) = done.stderr.splitlines()
     assert line.startswith("error: ")
     assert reason in line
+
+
+def test_what_is_no_file_is_not_replaced_by_one(tmp_path):
+    """As /dev/null, which root would take from everybody else."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for option in ("-o", "--rrd"):
+        done = run(BUCKET, "--radius", 0.01, option, pipe)
+        assert (done.returncode, done.stderr) == (1, f"error: cannot write {pipe}: it is no file\n")
+    with pytest.raises(MeshError, match="cannot be written: it is no file"):
+        save_body(pipe, sample_file(BUCKET, 0.01))
+    assert pipe.is_fifo()
+
+
+def test_body_and_recording_are_two_files(tmp_path):
+    done = run(BUCKET, "--radius", 0.01, "-o", tmp_path / "b", "--rrd", tmp_path / "." / "b")
+    assert (done.returncode, done.stderr) == (1, f"error: cannot write {tmp_path / 'b'}: it is named twice\n")
 
 
 def test_a_body_without_a_volume_is_written_all_the_same(tmp_path):
