@@ -61,17 +61,16 @@ def _run(options: argparse.Namespace) -> int:
 
         recording = Recording(options.rrd, read_mesh(path, options.scale), options.radius)
     names = ("spacing", "seed", "device", "count", "grain", "inset", "thickness", "sheets")
-    bar = _Bar()
-    body = sample_file(
-        path,
-        options.radius,
-        options.scale,
-        cache=options.cache and not recording,
-        progress=bar.show,
-        observe=recording.particles if recording else None,
-        **{name: getattr(options, name) for name in names},
-    )
-    bar.end()
+    with _Bar() as bar:
+        body = sample_file(
+            path,
+            options.radius,
+            options.scale,
+            cache=options.cache and not recording,
+            progress=bar.show,
+            observe=recording.particles if recording else None,
+            **{name: getattr(options, name) for name in names},
+        )
     sampled = time.perf_counter()
     seconds = {"sampling": sampled - begin}
     if recording:
@@ -116,10 +115,13 @@ def _parser() -> argparse.ArgumentParser:
 
 
 class _Bar:
-    """A progress bar on a terminal; silent elsewhere."""
+    """A progress bar on a terminal; silent elsewhere. Whatever is said afterwards begins a new line."""
 
     def __init__(self):
         self._open = False
+
+    def __enter__(self) -> "_Bar":
+        return self
 
     def show(self, share: float) -> None:
         if sys.stderr.isatty():
@@ -127,7 +129,7 @@ class _Bar:
             print(f"\rsampling [{'#' * full}{'.' * (40 - full)}] {100.0 * share:3.0f} %", end="", file=sys.stderr, flush=True)
             self._open = True
 
-    def end(self) -> None:
+    def __exit__(self, *_) -> None:
         if self._open:
             print(file=sys.stderr)
 

@@ -1,5 +1,6 @@
 """Bodies that were sampled before, and the command line."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -192,6 +193,23 @@ def test_command_line_refuses_with_one_line_before_the_work(folder, arguments, r
     (line,) = done.stderr.splitlines()
     assert line.startswith("error: ")
     assert reason in line
+
+
+def test_on_a_terminal_reasons_have_a_line_of_their_own():
+    """Below the bar, not behind it."""
+    main, end = os.openpty()
+    command = [sys.executable, "-m", "sampler", str(BUCKET), "--radius", "0.01", "--count", "5", "--grain", "0.001"]
+    child = subprocess.Popen(command, stdout=end, stderr=end, cwd=Path(__file__).parents[2])
+    os.close(end)
+    text = b""
+    with contextlib.suppress(OSError):  # as which the end of a terminal is told
+        while more := os.read(main, 10_000):
+            text += more
+    os.close(main)
+    assert child.wait() == 1
+    lines = text.decode().splitlines()
+    assert lines[-1].startswith("error: a grain of radius 0.001 m could pass")
+    assert lines[-2].endswith("100 %")
 
 
 def test_what_is_no_file_is_not_replaced_by_one(tmp_path):
