@@ -84,6 +84,12 @@ def _check_indices(name: str, root: ElementTree.Element) -> None:
             promised, held = int(primitive.get("count")), sum(len(text.split()) for text in texts) / (3 * stride)
             if promised != held:
                 raise MeshError(f"mesh {name}: is damaged: it promises {promised} triangles and holds {held:g}; export it again")
+        if primitive.tag.endswith("}polylist"):
+            sizes = [int(size) for counts in primitive.iterfind("{*}vcount") for size in (counts.text or "").split()]
+            corners, held = sum(sizes), sum(len(text.split()) for text in texts) / stride
+            if corners != held:
+                reason = f"its polygons have {corners} corners, it holds {held:g}"
+                raise MeshError(f"mesh {name}: is damaged: {reason}; export it again")
 
 
 def _cut_hollow_polygons(root: ElementTree.Element) -> bool:

@@ -185,6 +185,8 @@ def test_dae_is_read_whatever_else_is_broken(tmp_path, old, new):
             "</polylist><triangles count='2'><input semantic='VERTEX' source='#g0-v'/><p>0 1 2</p></triangles>",
             "holds 1",
         ),
+        ("<vcount>4 4 ", "<vcount>4 ", "its polygons have 20 corners, it holds 24"),
+        ("<vcount>4 4 ", "<vcount>4 4 4 ", "its polygons have 28 corners, it holds 24"),
         ("</polylist>", "</polylist><polygons><ph><p>0 0 0</p><h>1 0 0</h></ph></polygons>", "has <ph>"),
         ("count='8' stride='3'", "count='6' stride='4'", "something between its coordinates"),
         ("<instance_visual_scene url='#s'/>", "", "names no scene"),
