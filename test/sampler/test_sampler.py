@@ -9,6 +9,7 @@ import trimesh
 from spread import distances, neighbours
 
 from sampler import MeshError, SignedDistance, locate_mesh, make_field, read_mesh, sample_body
+from sampler.sampling import thinnest_wall
 from sampler.surface import Surface
 
 MESHES = Path(__file__).parents[2] / "config" / "meshes"
@@ -255,3 +256,12 @@ def test_a_spacing_that_would_let_grains_pass_is_made_finer_and_told():
     told = [sample_body(ball, 0.005, spacing=0.012, grain=grain).warnings for grain in (None, 0.02, 0.001)]
     assert told[:2] == [(), ()]
     assert told[2] == ("particles lie 0.0069 m apart, not 0.012 m, or grains of radius 0.001 m could pass",)
+
+
+def test_the_thinnest_wall_may_be_that_of_a_small_fin():
+    """Of 15,000th of the area, which some thousand random places are likely to miss."""
+    block, fin = trimesh.creation.box((1.0, 1.0, 1.0)), trimesh.creation.box((0.02, 5e-4, 0.02))
+    fin.apply_translation((0.0, 0.0, 0.5))
+    both = SignedDistance(trimesh.util.concatenate([block, fin]))
+    assert thinnest_wall(both.surface) == pytest.approx(5e-4)
+    assert not make_field(both, 0.01, memory=1 << 20).resolves_walls
