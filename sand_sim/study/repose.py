@@ -19,7 +19,7 @@ from sand_sim.world import World
 
 SIZE = 70.0, 6.0, 24.0  # of a bed, in diameters
 _SIDE = "frictionless side"
-_LOOSE = 2.5  # times the height of the bed, up to which it is filled loosely
+_LOOSE = 5.0  # times the height of the bed, up to which it is filled loosely
 _SETTLED, _PATIENCE = 0.02, 20.0  # how slow it is then, times sqrt(g d), and how long that may take, times sqrt(h/g)
 _PART, _FIRST, _PARTS = 0.25, 8, 100  # how long it flows until the next look, times sqrt(l/g); looks at least and at most
 _CALM, _RESTS = 4, 0.002  # it rests when in so many looks no larger share falls over the ledge; single spheres roll on for long
