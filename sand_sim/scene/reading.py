@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -182,17 +183,8 @@ def _tool(name: str, entry: Field) -> Tool:
         raise entry["scale"].refuse("a URDF is in metres and scales its meshes itself; leave it out")
     if not (name.isidentifier() and name.isascii()):
         raise entry.refuse("a tool's name becomes part of its topics: letters of ASCII, digits and underscores only")
-    track, angles = [], None
-    for stop in entry["trajectory"].entries() if "trajectory" in entry else []:
-        stop.keys(("time", "phase", "position", "orientation", "rpy"), required=("time",))
-        time = stop["time"].number(least=0.0, unit="s")
-        if track and time <= track[-1].time:
-            raise stop["time"].refuse(f"must be later than the waypoint before, at {track[-1].time:g} s")
-        widest = {"widest": math.inf} if angles else {}  # on from there, a tool may turn as often as it likes
-        angles = _turn_from(angles, stop["rpy"]) if "rpy" in stop else None
-        pose = {key: stop.value[key] for key in ("position", "orientation", "rpy") if key in stop.value}
-        track.append(Waypoint(time, read_pose(Field(pose, stop.path), **widest), stop.optional("phase", Field.text, "")))
-    initial = track[0].pose if track and "pose" not in entry else Pose()
+    pose = entry.optional("pose", read_pose, None)
+    track = _trajectory(entry["trajectory"], pose or Pose()) if "trajectory" in entry else []
     return Tool(
         name,
         mesh=entry.optional("mesh", Field.text, ""),
@@ -205,10 +197,29 @@ def _tool(name: str, entry: Field) -> Tool:
         scale=entry.optional("scale", lambda f: f.number(above=0.0), 1.0),
         thickness=entry.optional("thickness", lambda f: f.number(above=0.0, unit="m"), None),
         sheets=entry.optional("sheets", lambda f: f.choice(SHEETS), Tool.sheets),
-        pose=entry.optional("pose", read_pose, initial),
+        pose=pose or (track[0].pose if track else Pose()),
         max_speed=entry.optional("max_speed", lambda f: f.number(above=0.0, most=FASTEST, unit="m/s"), 2.0),
         trajectory=tuple(track),
     )
+
+
+def _trajectory(entry: Field, start: Pose) -> list[Waypoint]:
+    """Waypoints, which keep the position or the orientation of the one before, or of the start, where they name none."""
+    track, pose, angles = [], start, None
+    for stop in entry.entries():
+        stop.keys(("time", "phase", "position", "orientation", "rpy"), required=("time",))
+        time = stop["time"].number(least=0.0, unit="s")
+        if track and time <= track[-1].time:
+            raise stop["time"].refuse(f"must be later than the waypoint before, at {track[-1].time:g} s")
+        widest = {"widest": math.inf} if angles else {}  # on from there, a tool may turn as often as it likes
+        named = {key: stop.value[key] for key in ("position", "orientation", "rpy") if key in stop.value}
+        given = read_pose(Field(named, stop.path), **widest)
+        pose = replace(pose, position=given.position) if "position" in named else pose
+        if "rpy" in named or "orientation" in named:
+            pose = replace(pose, orientation=given.orientation)
+            angles = _turn_from(angles, stop["rpy"]) if "rpy" in named else None
+        track.append(Waypoint(time, pose, stop.optional("phase", Field.text, "")))
+    return track
 
 
 def _turn_from(before: Vector | None, rpy: Field) -> Vector:

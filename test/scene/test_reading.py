@@ -248,6 +248,22 @@ def test_orientation_may_be_given_as_roll_pitch_yaw():
     assert scene.tool("spade").pose.orientation == pytest.approx((0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)))
 
 
+def test_a_waypoint_stays_where_the_one_before_is_unless_it_says_otherwise():
+    """A tool that should only turn, or only go on, went to the origin or turned back."""
+    quarter = (0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5))
+    way = [
+        {"time": 0},
+        {"time": 1, "rpy": [0, 0, np.pi / 2]},
+        {"time": 2, "position": [3, 2, 2]},
+        {"time": 3, "orientation": [0, 0, 0, 1]},
+    ]
+    spade = GOOD["tools"]["spade"] | {"pose": {"position": [1, 2, 2]}, "trajectory": way}
+    poses = [stop.pose for stop in read_scene(changed(("tools", "spade"), spade), Path.cwd()).tool("spade").trajectory]
+    assert [pose.position for pose in poses] == [(1, 2, 2), (1, 2, 2), (3, 2, 2), (3, 2, 2)]
+    turns = np.array([pose.orientation for pose in poses])
+    np.testing.assert_allclose(turns, [(0, 0, 0, 1), quarter, quarter, (0, 0, 0, 1)], atol=1e-12)
+
+
 @pytest.mark.parametrize(("times", "lasts"), [((0.0, 4.0), 4.0), ((0.0,), 1.0)])
 def test_a_scene_lasts_to_the_last_waypoint(times, lasts):
     trajectory = [{"time": time, "position": [0.0, 0.0, time]} for time in times]
