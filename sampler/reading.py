@@ -26,7 +26,7 @@ _POINTER = b"version https://git-lfs"
 _OWN = {"stl": read_stl, "ply": read_ply, "off": read_off, "3mf": read_3mf}
 _LETTERS = bytes(range(128)) + 128 * b"?"
 _LARGEST = 1e100  # [m], of which squares and cubes are numbers yet
-_WITH_UNIT = ("dae", "zae")  # files whose unit trimesh tells
+_WITH_UNIT = ("dae", "zae", "zip")  # files whose unit trimesh tells, or of which one may be in them
 
 
 def read_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:

@@ -4,6 +4,7 @@ import re
 import struct
 import subprocess
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -28,9 +29,13 @@ def test_unit_and_node_transforms_of_dae_are_applied(tmp_path, box):
     head, _, tail = text.partition("<node")
     opening, _, rest = tail.partition(">")
     path.write_text(f"{head}<node{opening}><matrix>0 -2 0 3 2 0 0 0 0 0 2 0 0 0 0 1</matrix>{rest}")
-    mesh = read_mesh(path)
-    assert mesh.extents == pytest.approx(np.array([0.12, 0.2, 0.04]) * 0.0254, rel=1e-6)
-    assert mesh.bounds.mean(axis=0) == pytest.approx([3 * 0.0254, 0, 0], abs=1e-7)
+    for ending in (".zae", ".zip"):
+        with zipfile.ZipFile(path.with_suffix(ending), "w") as archive:
+            archive.write(path, path.name)
+    for ending in (".dae", ".zae", ".zip"):
+        mesh = read_mesh(path.with_suffix(ending))
+        assert mesh.extents == pytest.approx(np.array([0.12, 0.2, 0.04]) * 0.0254, rel=1e-6)
+        assert mesh.bounds.mean(axis=0) == pytest.approx([3 * 0.0254, 0, 0], abs=1e-7)
 
 
 def test_materials_of_obj_need_no_pillow(tmp_path, box):
