@@ -1,6 +1,7 @@
 """Scenes for tests, and a ROS domain of their own."""
 
 import os
+import signal
 import socket
 import sys
 from pathlib import Path
@@ -30,6 +31,14 @@ os.environ["ROS_DOMAIN_ID"] = str(DOMAIN)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from scenes import SceneMaker
+
+
+@pytest.fixture
+def hears_hang_up():
+    """Processes that a test starts hear SIGHUP, also where the tests themselves are started by nohup, which they inherit."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
 
 
 @pytest.fixture

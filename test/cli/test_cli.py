@@ -180,6 +180,7 @@ def test_ctrl_c_keeps_what_was_recorded(tmp_path):
     assert "written: results/dig.rrd" in output
 
 
+@pytest.mark.usefixtures("hears_hang_up")
 @pytest.mark.parametrize("before", [[], ["nohup"]])
 def test_a_terminal_that_is_closed_ends_a_run_as_ctrl_c_does(tmp_path, before):
     """As that of a remote login that breaks off; the results were lost, and what is told afterwards finds no terminal."""

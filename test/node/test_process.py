@@ -57,6 +57,7 @@ def test_arguments_that_are_not_for_ros_run_no_other_scene(words, code, named):
     assert named in told and len(told.splitlines()) == 1
 
 
+@pytest.mark.usefixtures("hears_hang_up")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("delay", [0.3, 1.5, 4.0])
 def test_signals_end_the_node_cleanly(start_process, tmp_path, number, delay):
