@@ -25,6 +25,7 @@ _PART, _FIRST, _PARTS = 0.25, 8, 100  # how long it flows until the next look, t
 _CALM, _RESTS = 4, 0.002  # it rests when in so many looks no larger share falls over the ledge; single spheres roll on for long
 _SQUARE = 2.0  # the highest grain of each square so wide is the surface, in diameters
 _FOOT, _CREST = 0.3, 0.8  # the slope is measured between these shares of the height
+_LEVEL = 0.85  # share of the height that must be left behind the slope; else it reaches the end, and only layers are measured
 _LEAST = 3  # rows of squares that make a slope
 
 
@@ -91,10 +92,13 @@ def find_repose(
     else:
         raise SceneError(f"fills: '{fill}' still flows after {world.time:.2g} s")
     progress("flowing", 1.0)
-    slope = _slope(seen.grains, diameter)
+    slope, level = _slope(seen.grains, diameter)
     if len(slope) < _LEAST:
         raise SceneError(f"fills: '{fill}' stands too steep at the ledge to measure a slope, or has none left")
-    return Repose(math.degrees(math.atan(np.polyfit(*slope.T, 1)[0])), slope, len(before), seen.health.doubts)
+    doubts = seen.health.doubts
+    if level < _LEVEL * size[2] * diameter:
+        doubts += ("the slope reaches the end of the bed, so it is flatter than that; sand so slippery is not measured here",)
+    return Repose(math.degrees(math.atan(np.polyfit(*slope.T, 1)[0])), slope, len(before), doubts)
 
 
 def _typical(size: SizeDistribution) -> float:
@@ -134,8 +138,8 @@ def _bed(scene: Scene, fill: Fill, size: np.ndarray, diameter: float, gravity: f
     )
 
 
-def _slope(grains: GrainCloud, diameter: float) -> np.ndarray:
-    """Way from the ledge and height of the surface, shape (n, 2) [m], where a bed slopes."""
+def _slope(grains: GrainCloud, diameter: float) -> tuple[np.ndarray, float]:
+    """Way from the ledge and height of the surface, shape (n, 2) [m], where a bed slopes; and how high it is at most [m]."""
     square = np.floor(grains.position[:, :2] / (_SQUARE * diameter)).astype(int).clip(0)
     highest = np.zeros(square.max(axis=0) + 1)
     np.maximum.at(highest, tuple(square.T), grains.position[:, 2] + grains.radius)
@@ -143,4 +147,4 @@ def _slope(grains: GrainCloud, diameter: float) -> np.ndarray:
     way = (np.arange(len(height)) + 0.5) * _SQUARE * diameter
     full = height.max()
     crest = np.flatnonzero(height > _CREST * full)[0]
-    return np.column_stack([way, height])[:crest][height[:crest] > _FOOT * full]
+    return np.column_stack([way, height])[:crest][height[:crest] > _FOOT * full], float(full)
