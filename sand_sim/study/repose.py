@@ -77,7 +77,9 @@ def find_repose(
         raise SceneError("gravity: nothing comes to rest without it")
     closed = _bed(scene, replace(own, seed=seed), diameter * np.array(size), diameter, gravity)
     before = World(closed, progress).observe().grains
-    np.savez(folder / "bed.npz", position=before.position, radius=before.radius, orientation=before.orientation)
+    density = scene.materials[scene.material_index(own.material)].density
+    radius = np.cbrt(before.mass / (4.0 / 3.0 * np.pi * density))  # of clumps, too, that of a sphere as large
+    np.savez(folder / "bed.npz", position=before.position, radius=radius, orientation=before.orientation)
     same = replace(closed.fills[0], file=folder / "bed.npz", size=None, height=None)
     world = World(replace(closed, fills=(same,), boundaries=closed.boundaries[1:], settle=Settle()))
     part = round(_PART * math.sqrt(size[0] * diameter / gravity) / world.time_step)

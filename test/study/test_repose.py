@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scenes import SceneMaker
 
-from sand_sim import SceneError, read_scene
+from sand_sim import SceneError, World, read_scene
 from sand_sim.cli.main import main
 from sand_sim.study import repose
 
@@ -40,6 +40,26 @@ def test_sand_that_slides_and_rolls_less_easily_rests_steeper(tmp_path):
     assert 12.0 < found[0].angle < found[1].angle - 6.0
     assert found[1].angle < 45.0
     assert found[1].doubts == ()
+
+
+def test_clumps_lie_over_the_ledge_as_they_lay_behind_the_gate(tmp_path, monkeypatch):
+    """A file tells the sizes of spheres as large, not how far a clump reaches: they were half as large again, and flew apart."""
+    seen = []
+
+    class Seen(World):
+        def __init__(self, *words):
+            super().__init__(*words)
+            seen.append(self.observe())
+            if len(seen) == 2:
+                raise InterruptedError
+
+    monkeypatch.setattr(repose, "World", Seen)
+    fill = {"material": "grain", "name": "bed", "shape": "tetrahedron", "radius": 0.005, "count": 10} | WHERE
+    with pytest.raises(InterruptedError):
+        repose.find_repose(sand(tmp_path, fills=[fill]), "bed", 1, tmp_path, size=(12.0, 4.0, 4.0))
+    before, after = seen
+    np.testing.assert_allclose(after.grains.mass, before.grains.mass, rtol=1e-5)
+    assert after.health.deepest == pytest.approx(before.health.deepest, rel=0.01)
 
 
 @pytest.mark.parametrize(
