@@ -17,12 +17,14 @@ class Caps:
         faces: oriented as their component, shape (k, 3).
         owner: component of each, shape (k,).
         loop: number of the boundary loop that each helps to close, shape (k,): one of n corners takes n - 2 faces.
-        turn: by how much each loop turns at its corners in all, within the surface it bounds [rad], shape (loops,).
+        loops: corners of each loop, in the direction in which its cap runs along it.
+        turn: by how much each turns at its corners in all, within the surface it bounds [rad], shape (loops,).
     """
 
     faces: np.ndarray
     owner: np.ndarray
     loop: np.ndarray
+    loops: list[np.ndarray]
     turn: np.ndarray
 
 
@@ -41,7 +43,7 @@ def close_holes(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) 
         loops.append(loop)
     owner, number = np.array(owners, np.int64), [len(cap) for cap in caps[1:]]
     turn = _turns(vertices, faces, component, owner, loops)
-    return Caps(np.concatenate(caps), np.repeat(owner, number), np.repeat(np.arange(len(number)), number), turn)
+    return Caps(np.concatenate(caps), np.repeat(owner, number), np.repeat(np.arange(len(number)), number), loops, turn)
 
 
 def _turns(vertices, faces, component, owner: np.ndarray, loops: list[np.ndarray]) -> np.ndarray:

@@ -11,6 +11,7 @@ import trimesh
 from sampler.caps import Caps, close_holes
 from sampler.errors import MeshError
 from sampler.orientation import agree_faces, face_outward, inward_pieces, outside_on_both_sides
+from sampler.raising import raise_caps
 from sampler.reading import check_mesh
 from sampler.surface import Surface
 from sampler.topology import edges_of, link_items, merge_points
@@ -118,15 +119,18 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     kind = np.where(sheet[component], SHEET, SOLID)
     report.steps["holes closed"] = len(np.unique(caps.loop[keep]))
     report.steps["sheets"] = int(sheet.sum())
-    faces = np.concatenate([faces, caps.faces[keep]])
-    component = np.concatenate([component, caps.owner[keep]])
-    kind = np.concatenate([kind, np.full(int(keep.sum()), CAP)])
+    vertices, capping, owner = raise_caps(vertices, faces, caps, keep)
+    faces = np.concatenate([faces, capping])
+    component = np.concatenate([component, owner])
+    kind = np.concatenate([kind, np.full(len(capping), CAP)])
     faces, report.steps["components turned"] = face_outward(vertices, faces, component, loose[component])
     asked = np.flatnonzero((kind == SOLID) & ~loose[component])
     if len(asked) and int(piece.max()) >= len(area):
         faces, kind = _mend_pieces(vertices, faces, kind, piece, asked, report)
     large = keep & (np.bincount(caps.loop)[caps.loop] > 1)
-    _warn(report, float(Surface.areas_of(vertices[caps.faces[large]]).sum() / area.sum()), int(large.sum()), clashes)
+    _warn(
+        report, float(Surface.areas_of(vertices[caps.faces[large]]).sum() / area.sum()), len(np.unique(caps.loop[large])), clashes
+    )
     return RepairedMesh(vertices, faces, kind, closed, report)
 
 
@@ -247,11 +251,10 @@ def _refuse_soup(component: np.ndarray, area: np.ndarray, sheet: np.ndarray) -> 
         )
 
 
-def _warn(report: RepairReport, hole: float, faces: int, clashes: int) -> None:
-    if faces:
+def _warn(report: RepairReport, share: float, holes: int, clashes: int) -> None:
+    if holes:
         report.warnings.append(
-            f"holes were closed flat with {faces} faces, {100.0 * hole:.2g} % of the surface; "
-            "sign, volume and inertia are uncertain there"
+            f"{holes} holes were closed, {100.0 * share:.2g} % of the surface; sign, volume and inertia are uncertain there"
         )
     if clashes:
         report.warnings.append(f"{clashes} edges join faces that cannot be oriented consistently (one-sided or self-touching)")

@@ -83,7 +83,7 @@ def test_what_was_guessed_of_a_mesh_is_told(tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     told = lines[lines.index("meshes: what had to be mended or guessed") + 1]
     assert told.startswith("  tool 'plate' ")
-    assert "holes were closed flat" in told or "taken for sheets" in told
+    assert "holes were closed" in told or "taken for sheets" in told
 
 
 def test_what_is_guessed_of_a_mass_is_told_of_bodies_alone(tmp_path):
