@@ -1,12 +1,14 @@
 """Raising caps: over a hole in a curved surface, at an edge or a corner, they go on as the faces around it do, instead of flat.
 
-A rim that lies in a plane is taken for a cut, and its cap stays flat. Else the cap is split once, and each new place is where the
-planes of the faces along the rim meet best (quadric error, Garland & Heckbert 1997), those near by above all.
+A rim that lies in a plane is taken for a cut, a wide hole for the mouth of a vessel; their caps stay flat. Others are split once,
+and each new place is where the planes of the faces along the rim meet best (quadric error, Garland & Heckbert 1997), near ones
+above all.
 """
 
 import numpy as np
 
 from sampler.caps import Caps
+from sampler.surface import Surface
 from sampler.topology import edges_of
 
 _HOLD = 0.02  # weight of the flat cap beside the planes, which otherwise may not meet at all
@@ -16,7 +18,7 @@ _PAIRS = 1_000_000  # places times rim edges, as many as are held at once
 
 
 def raise_caps(
-    vertices: np.ndarray, faces: np.ndarray, caps: Caps, taken: np.ndarray
+    vertices: np.ndarray, faces: np.ndarray, caps: Caps, taken: np.ndarray, most: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Raise caps after the faces around them.
 
@@ -25,6 +27,7 @@ def raise_caps(
         faces: those around the holes, oriented, shape (m, 3).
         caps: flat.
         taken: faces of the caps that are asked for, whole loops, shape (k,).
+        most: area that the cap of a hole has at most to be raised, of each component [m^2].
 
     Returns:
         Vertices with new ones at the end, shape (n + more, 3) [m]; faces of the caps and their components, shapes (j, 3), (j,).
@@ -36,14 +39,15 @@ def raise_caps(
     points, raised, owner = [vertices], [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)]
     by_loop = np.split(np.flatnonzero(taken), np.flatnonzero(np.diff(caps.loop[taken])) + 1) if taken.any() else []
     for group in by_loop:
-        cap, loop = caps.faces[group], caps.loops[caps.loop[group[0]]]
+        cap, loop, component = caps.faces[group], caps.loops[caps.loop[group[0]]], caps.owner[group[0]]
         sought = np.roll(loop, -1) * number + loop  # the face beyond runs the other way
         beyond = np.searchsorted(side, sought).clip(max=len(side) - 1)
-        if np.all(side[beyond] == sought) and not _plane(vertices[loop]):
+        narrow = Surface.areas_of(vertices[cap]).sum() < most[component]
+        if narrow and np.all(side[beyond] == sought) and not _plane(vertices[loop]):
             middles, cap = _split(vertices, cap, sum(map(len, points)))
             points.append(_raised(middles, vertices[loop], vertices[faces[order[beyond] // 3]]))
         raised.append(cap)
-        owner.append(np.full(len(cap), caps.owner[group[0]]))
+        owner.append(np.full(len(cap), component))
     return np.concatenate(points), np.concatenate(raised), np.concatenate(owner)
 
 

@@ -119,7 +119,7 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     kind = np.where(sheet[component], SHEET, SOLID)
     report.steps["holes closed"] = len(np.unique(caps.loop[keep]))
     report.steps["sheets"] = int(sheet.sum())
-    vertices, capping, owner = raise_caps(vertices, faces, caps, keep)
+    vertices, capping, owner = raise_caps(vertices, faces, caps, keep, _SHEET / _TORN * area)
     faces = np.concatenate([faces, capping])
     component = np.concatenate([component, owner])
     kind = np.concatenate([kind, np.full(len(capping), CAP)])
@@ -128,9 +128,8 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
     if len(asked) and int(piece.max()) >= len(area):
         faces, kind = _mend_pieces(vertices, faces, kind, piece, asked, report)
     large = keep & (np.bincount(caps.loop)[caps.loop] > 1)
-    _warn(
-        report, float(Surface.areas_of(vertices[caps.faces[large]]).sum() / area.sum()), len(np.unique(caps.loop[large])), clashes
-    )
+    share = float(Surface.areas_of(vertices[caps.faces[large]]).sum() / area.sum())
+    _warn(report, share, clashes)
     return RepairedMesh(vertices, faces, kind, closed, report)
 
 
@@ -251,10 +250,10 @@ def _refuse_soup(component: np.ndarray, area: np.ndarray, sheet: np.ndarray) -> 
         )
 
 
-def _warn(report: RepairReport, share: float, holes: int, clashes: int) -> None:
-    if holes:
+def _warn(report: RepairReport, share: float, clashes: int) -> None:
+    if share:
         report.warnings.append(
-            f"{holes} holes were closed, {100.0 * share:.2g} % of the surface; sign, volume and inertia are uncertain there"
+            f"holes were closed, {100.0 * share:.2g} % of the surface; sign, volume and inertia are uncertain there"
         )
     if clashes:
         report.warnings.append(f"{clashes} edges join faces that cannot be oriented consistently (one-sided or self-touching)")

@@ -62,13 +62,20 @@ def test_what_was_cut_off_in_a_plane_stays_flat():
     assert np.ptp(cap[..., 2]) < 1e-12
 
 
+def test_the_mouth_of_a_vessel_is_spanned_taut():
+    scoop = trimesh.creation.box((1.0, 1.0, 1.0))
+    scoop = without(scoop, (scoop.face_normals[:, 2] > 0.5) | (scoop.face_normals[:, 0] > 0.5))  # the top and the front
+    assert integrate(repair_mesh(scoop, sheets="never").triangles)[0] == pytest.approx(1.0, rel=1e-12)
+
+
 def test_only_whole_caps_that_are_asked_for_are_raised():
     balls = [trimesh.creation.icosphere(subdivisions=2).apply_translation([x, 0.0, 0.0]) for x in (0.0, 3.0)]
     both = trimesh.util.concatenate([damaged(ball, "hole") for ball in balls])
     vertices, faces = np.asarray(both.vertices), np.asarray(both.faces)
     component = (both.triangles_center[:, 0] > 1.5).astype(int)
     caps = close_holes(vertices, faces, component)
-    more, raised, owner = raise_caps(vertices, faces, caps, caps.owner == 1)
+    wide = np.full(2, np.inf)
+    more, raised, owner = raise_caps(vertices, faces, caps, caps.owner == 1, wide)
     assert np.all(owner == 1)
     assert len(more) > len(vertices)
     assert np.array_equal(more[: len(vertices)], vertices)
@@ -76,4 +83,4 @@ def test_only_whole_caps_that_are_asked_for_are_raised():
     one.remove_unreferenced_vertices()
     assert one.is_watertight
     assert one.is_winding_consistent
-    assert len(raise_caps(vertices, faces, caps, np.zeros(len(caps.faces), bool))[1]) == 0
+    assert len(raise_caps(vertices, faces, caps, np.zeros(len(caps.faces), bool), wide)[1]) == 0
