@@ -26,6 +26,7 @@ SPACING = 1.5  # default distance between neighbours in particle radii; below 2 
 _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest grain
 _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
+_CROWDED = 1e-3  # nearer to one another than this, in radii, are particles whose inset surface is next to nothing
 _LOOSE = 1.1  # times what is to be expected of distance and coverage, from which strips are sought that have too few particles
 _NOTABLE = 0.01  # share of the volume that is not worth a warning
 _OPEN = 0.01  # openness of a surface from which its volume is counted, not integrated
@@ -202,6 +203,10 @@ def _inset_skin(inside: Inside, plates: np.ndarray, radius: float, spacing: floa
             raise MeshError(f"mesh: particles of radius {radius:.3g} m find no room in it; take smaller ones, or no inset")
         skin = Skin(np.concatenate([triangles, plates]), inside.skin.device, np.append(layers, np.ones(len(plates))))
         finer = spacing if count is None else lattice_spacing(float(skin.areas.sum()), count)
+        if finer < _CROWDED * radius:
+            raise MeshError(
+                f"mesh: particles of radius {radius:.3g} m find hardly any room in it; take smaller ones, or no inset"
+            )
         if finer > 0.8 * spacing:
             break
         spacing = finer

@@ -139,3 +139,10 @@ def test_contours_keep_sharp_edges():
     assert Surface.areas_of(found)[facing < 0.5].sum() < 2e-3 * 6.0 * 0.8**2
     corner = 0.4 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) @ turn.T
     assert distances(corner, found.reshape(-1, 3)).max() < 0.2 * 0.05
+
+
+@pytest.mark.parametrize("radius", [0.49, 0.6])
+def test_particles_that_fill_a_whole_solid_are_refused(radius):
+    # What is left one radius below the skin is next to a point: two thousand places on it took all memory.
+    with pytest.raises(MeshError, match="find hardly any room in it; take smaller ones"):
+        sample_body(trimesh.creation.box((1.0, 1.0, 1.0)), radius, count=2000, inset=True)
