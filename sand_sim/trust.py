@@ -39,6 +39,9 @@ def find_doubts(health: Health, safe_now: float, beforehand: tuple[str, ...] = (
 
 
 def gained_share(health: Health) -> float:
-    """Energy that appeared from nowhere over all energy handled so far [1]."""
-    handled = health.kinetic + abs(health.potential) + health.elastic + abs(health.tool_work)
+    """Energy that appeared from nowhere over all energy handled so far [1].
+
+    What bonds store lies below zero; taken with its sign it would leave nothing to compare with where grains stick together.
+    """
+    handled = health.kinetic + abs(health.potential) + abs(health.elastic) + abs(health.tool_work)
     return health.gained / handled if handled > 0.0 else 0.0

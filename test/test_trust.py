@@ -43,5 +43,5 @@ def test_a_run_no_faster_than_expected_is_not_too_fast():
 def test_what_was_gained_is_compared_with_all_energy_handled(field, sign):
     still = replace(SOUND, kinetic=0.0, potential=0.0, elastic=0.0, tool_work=0.0, gained=0.03)
     assert gained_share(still) == 0.0
-    if sign > 0.0 or field in ("potential", "tool_work"):
+    if sign > 0.0 or field != "kinetic":  # of what sticks together more is stored below zero than there is above
         assert gained_share(replace(still, **{field: sign * 2.0})) == pytest.approx(0.015)
