@@ -22,7 +22,7 @@ from sand_sim.study.pareto import Plan, Study
 from sand_sim.study.quantity import QUANTITIES
 from sand_sim.study.ready import TOLERANCES, WHOLE, prepare
 from sand_sim.study.scene_writing import write_scene
-from sand_sim.study.table import percent, plain_rows, seconds, table_text
+from sand_sim.study.table import chance_text, percent, plain_rows, seconds, table_text
 from sand_sim.study.variation import Edit, Facts, Variation, to
 
 
@@ -91,7 +91,7 @@ def _sum_up(study: Study, chosen: tuple | None, tolerance: float) -> None:
     if orders:
         print("  order in the time step: " + ", ".join(f"{name} {order:.2f}" for name, order in orders.items()))
     if scatter is not None:
-        print(f"  by chance alone, two sets of runs of the reference lie {percent(scatter)} apart; more --repeats lower that")
+        print(f"  {chance_text(scatter)}")
     if chosen is None:
         best = min((row for row in study.rows() if row.trusted), key=lambda row: row.error.high, default=None)
         nearest = f"; the nearest is '{best.title}' with {percent(best.error.high)}" if best else ""
@@ -114,7 +114,7 @@ def _write(study: Study, name: str, chosen: tuple | None, notes: list[str], fold
         "quantity": plan.quantity,
         "tolerance": plan.tolerance,
         "notes": notes,
-        "scatter": scatter,
+        "scatter": scatter or None,  # zero where repeats have nothing to vary
         "order_in_time_step": study.orders(),
         "recommended": recommended or None,
         "settings": plain_rows(rows),

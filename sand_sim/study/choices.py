@@ -1,6 +1,19 @@
 """The choices that trade accuracy for time, and the settings of each that a study tries."""
 
-from sand_sim.study.variation import Edit, Variation, automatic, counted, dampers, skins, springs, steps, times, to, where_given
+from sand_sim.study.variation import (
+    Edit,
+    Variation,
+    automatic,
+    counted,
+    dampers,
+    drawn,
+    skins,
+    springs,
+    steps,
+    times,
+    to,
+    where_given,
+)
 
 WRITTEN = Variation("", "as written", (), quick=True)
 
@@ -12,14 +25,15 @@ def stepped(divisor: float, quick: bool = False) -> Variation:
 
 
 def stiff(factor: float, quick: bool = False) -> Variation:
-    """All materials stiffer or softer."""
-    return Variation("stiffness", f"E x {factor:g}", (Edit("materials.*.young", times(factor)),), quick)
+    """All materials stiffer or softer, and linear springs, which do not follow them."""
+    paths = "materials.*.young", "pairs.*.stiffness", "pairs.*.shear_stiffness"
+    return Variation("stiffness", f"E x {factor:g}", tuple(Edit(path, times(factor)) for path in paths), quick)
 
 
 def coarse(factor: float, quick: bool = False) -> Variation:
     """Larger grains, as many as fill the same space."""
     # Tool particles grow with the grains, which else would touch many of them at once.
-    edits = (Edit("fills.*.radius", times(factor)), Edit("fills.*.count", counted(factor**-3)))
+    edits = (Edit("fills", drawn), Edit("fills.*.radius", times(factor)), Edit("fills.*.count", counted(factor**-3)))
     edits += (Edit("tools.*.particle_radius", times(factor)),)
     return Variation("grain size", f"radius x {factor:g}", edits, quick)
 

@@ -41,6 +41,13 @@ def plain_rows(rows: list[Row]) -> list[dict]:
     ]
 
 
+def chance_text(scatter: float) -> str:
+    """What is said of how far two sets of runs of the reference lie apart by chance [1]."""
+    if scatter == 0.0:
+        return "repeats do not differ, having no seeds or walls to vary, so that nothing is known of what chance does"
+    return f"by chance alone, two sets of runs of the reference lie {percent(scatter)} apart; more --repeats lower that"
+
+
 def percent(value: float) -> str:
     """A share in percent, three digits."""
     return f"{100.0 * value:.3g} %"

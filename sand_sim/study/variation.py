@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sand_sim.assemble import assemble
-from sand_sim.scene.types import Scene, unit
+from sand_sim.scene.types import Scene, SceneError, unit
 
 _UNSCALED = ("weights",)  # numbers inside a scaled entry that are no lengths
 
@@ -113,6 +113,16 @@ def where_given(value: Any) -> Change:
     return lambda old, facts: None if old is None else value
 
 
+def drawn(old: Any, facts: Facts) -> None:
+    """Leave fills alone, but refuse a variation of their sizes where grains come from files, which no edit reaches.
+
+    Raises:
+        SceneError: if no fill is drawn.
+    """
+    if all(fill.get("file") is not None for fill in old or ()):
+        raise SceneError("fills: none is drawn by its sizes, and grains from a file have those that it says")
+
+
 def steps(factor: float) -> Change:
     """A multiple of the safe time step, shortened so that whole steps make a frame [s]."""
     return lambda old, facts: float(facts.frame / np.ceil(facts.frame / (factor * facts.step)))
@@ -145,21 +155,36 @@ def repeated(parsed: dict, repeat: int, facts: Facts) -> dict:
     """A scene that differs from ``parsed`` by chance only, to see how much chance does; repeat zero is the scene itself.
 
     Fills take other seeds. Where grains come from a file, or there are none beside bodies, planes are moved back by up to a
-    thousandth of a radius instead, so that contacts begin elsewhere within a time step and sums round differently.
+    thousandth of a radius instead, so that contacts begin elsewhere within a time step and sums round differently; without planes
+    all other walls are, but for cylinders and cones, which stand on something.
     """
     changed, random = deepcopy(parsed), np.random.default_rng(repeat)
     if repeat == 0:
         return changed
     fills = changed.get("fills") or []
-    drawn = [fill for fill in fills if fill.get("file") is None]
-    for fill in drawn:
+    sown = [fill for fill in fills if fill.get("file") is None]
+    for fill in sown:
         fill["seed"] = int(fill.get("seed") or 0) + 1000 * repeat
-    if len(drawn) < len(fills) or not fills:
-        for plane in changed.get("boundaries") or ():
-            if plane.get("type") == "plane":
-                shift = 1e-3 * facts.radius * random.uniform() * unit(plane["normal"])
-                plane["point"] = [float(p) - float(s) for p, s in zip(plane["point"], shift, strict=True)]
+    if len(sown) < len(fills) or not fills:
+        walls = changed.get("boundaries") or ()
+        for wall in [wall for wall in walls if wall.get("type") == "plane"] or walls:
+            _move_back(wall, 1e-3 * facts.radius * random.uniform())
     return changed
+
+
+def _move_back(wall: dict, way: float) -> None:
+    """Move a wall away from the grains, which lie above a terrain [m]; cylinders and cones stay where they are."""
+    if "normal" in wall:
+        wall["point"] = _shifted(wall["point"], -way * unit(wall["normal"]))
+    elif wall.get("type") == "box":
+        wall["low"], wall["high"] = _shifted(wall["low"], [-way] * 3), _shifted(wall["high"], [way] * 3)
+    elif wall.get("type") == "terrain":
+        pose = wall.get("pose") or {}
+        wall["pose"] = pose | {"position": _shifted(pose.get("position", [0.0] * 3), [0.0, 0.0, -way])}
+
+
+def _shifted(place: Any, by: Any) -> list[float]:
+    return [float(p) + float(s) for p, s in zip(place, by, strict=True)]
 
 
 def _scale(value: Any, factor: float) -> Any:

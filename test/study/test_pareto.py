@@ -16,6 +16,7 @@ from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.study.choices import CHOICES, REFERENCE
 from sand_sim.study.pareto import Plan, Study
 from sand_sim.study.quantity import Wrench
+from sand_sim.study.table import chance_text
 from sand_sim.study.variation import Edit, Variation, to
 
 
@@ -80,6 +81,29 @@ def test_nothing_is_recommended_where_nothing_is_good_enough(small):
     study = Study(*small, Plan("wrench", 1e-12, 2, ()))
     study.run()
     assert study.recommendation() is None
+
+
+@pytest.mark.parametrize("walls", ["box", "none"])
+def test_what_chance_does_is_measured_or_said_to_be_unknown(small, walls):
+    """Of a bed from a file in a box all repeats were the same, and by chance alone they lay 0 % apart."""
+    parsed, folder = small
+    sides = {
+        "type": "box",
+        "name": "bin",
+        "material": "steel",
+        "low": [-0.01, -0.01, 0],
+        "high": [0.05, 0.05, 0.2],
+        "open": ["top"],
+    }
+    parsed |= {"boundaries": [sides] if walls == "box" else [], "duration": 0.1}
+    study = Study(parsed, folder, Plan("spread", 1.0, 2, ()))
+    study.run()
+    if walls == "box":
+        assert study.scatter() > 0.0
+        assert " % apart" in chance_text(study.scatter())
+    else:
+        assert study.scatter() == 0.0
+        assert "nothing is known of what chance does" in chance_text(study.scatter())
 
 
 def test_interrupted_study_keeps_what_was_run(small):

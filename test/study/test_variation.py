@@ -2,6 +2,7 @@
 
 import pytest
 
+from sand_sim.scene.types import SceneError
 from sand_sim.study.choices import CHOICES
 from sand_sim.study.variation import Edit, Facts, Variation, counted, repeated, springs, steps, times, to, where_given
 
@@ -87,3 +88,48 @@ def test_every_choice_has_several_settings_and_a_title_of_its_own():
     }
     assert len({one.title for one in CHOICES}) == len(CHOICES)
     assert {one.group for one in CHOICES if one.quick} == {one.group for one in CHOICES}
+
+
+PLATE = {"type": "hole_plate", "point": [0, 0, 0], "normal": [0, 0, 2], "hole_radius": 0.01, "radius": 0.1}
+BOX = {"type": "box", "low": [0, 0, 0], "high": [1, 1, 1]}
+GROUND = {"type": "terrain", "mesh": "ground.stl", "particle_radius": 0.01}
+TURNED = GROUND | {"pose": {"position": [0, 0, 0], "rpy": [0, 0, 1]}}
+BACK = {  # how far each has moved away from grains above it, or inside of it [m]
+    "hole_plate": lambda wall: [-wall["point"][2]],
+    "box": lambda wall: [*(-c for c in wall["low"]), *(c - 1 for c in wall["high"])],
+    "terrain": lambda wall: [-wall["pose"]["position"][2]],
+}
+
+
+@pytest.mark.parametrize("wall", [PLATE, BOX, GROUND, TURNED])
+def test_chance_moves_other_walls_where_there_are_no_planes(wall):
+    """Repeats of a bed from a file in a box were the same to the bit, and by chance alone nothing seemed to happen."""
+    round_about = {"type": "cylinder", "point": [0, 0, 0], "axis": [0, 0, 1], "radius": 0.1}
+    parsed = {"fills": [{"file": "bed.npz"}], "boundaries": [wall, round_about]}
+    (first, other), (second, _) = (repeated(parsed, repeat, FACTS)["boundaries"] for repeat in (1, 2))
+    assert first != second
+    assert other == round_about
+    assert first.get("pose", {}).get("rpy") == wall.get("pose", {}).get("rpy")
+    for moved in (first, second):
+        assert all(0.0 < way < 1e-3 * FACTS.radius for way in BACK[wall["type"]](moved))
+
+
+def test_grains_of_files_are_not_made_larger():
+    """The particles of tools alone grew, by which a bed from a file seemed to be as good with larger grains."""
+    coarse = next(one for one in CHOICES if one.group == "grain size")
+    tools = {"tools": {"plate": {"particle_radius": 0.002}}}
+    for fills in ([{"file": "bed.npz"}], []):
+        with pytest.raises(SceneError, match="fills: "):
+            coarse.apply({"fills": fills} | tools, FACTS)
+    mixed = coarse.apply({"fills": [{"file": "bed.npz"}, {"radius": 0.01, "count": 8}]} | tools, FACTS)
+    assert mixed["fills"][1]["radius"] == pytest.approx(0.015)
+
+
+def test_linear_springs_are_softer_where_materials_are():
+    """Softer materials alone change nothing of a bed of linear springs."""
+    soft = next(one for one in CHOICES if one.title == "stiffness: E x 0.1")
+    parsed = {"materials": {"a": {"young": 1e9}}, "pairs": [{"stiffness": 2e4, "shear_stiffness": "1e4"}, {"friction": 0.5}]}
+    assert soft.apply(parsed, FACTS) == {
+        "materials": {"a": {"young": 1e8}},
+        "pairs": [{"stiffness": 2e3, "shear_stiffness": 1e3}, {"friction": 0.5}],
+    }
