@@ -9,6 +9,7 @@ import warp as wp
 
 from sand_sim.assemble import Assembly
 from sand_sim.engine.arrays import DemArrays
+from sand_sim.engine.device import CpuDevice, CudaDevice, open_device
 from sand_sim.engine.explicit_dem import ExplicitDem
 from sand_sim.engine.lattice import Lattice
 from sand_sim.engine.recipe import Recipe
@@ -148,12 +149,23 @@ def array_sizes(arrays: DemArrays) -> dict[str, int]:
 
 
 def measure_cost(assembly: Assembly, check: Callable[[], None] = lambda: None) -> float:
-    """Time of one sphere and step [s] in a packed sample with this scene's kernels, on this machine and its threads."""
+    """Time of one sphere and step [s] in a packed sample with this scene's kernels, on this machine.
+
+    On all threads of its device, or on fewer where they are quicker: a run finds that out for itself (``engine/crew.py``), but
+    takes longer for it than a sample lasts.
+    """
+    own = assembly.solver.device
+    fewer = {-(-own.lanes // 2**k) for k in range(1, own.lanes.bit_length() + 1)} - {own.lanes}
+    devices = [own, *(open_device(assembly.scene.solver.device, threads) for threads in sorted(fewer))]
+    return min(sample_cost(assembly, device, check) for device in devices)
+
+
+def sample_cost(assembly: Assembly, device: CpuDevice | CudaDevice, check: Callable[[], None] = lambda: None) -> float:
+    """The same on a device, on all of its threads."""
     table = _packed_sample(assembly)
     lattice = Lattice(table.position.min(axis=0) - 1.0, table.position.max(axis=0) + 1.0, assembly.recipe.precision)
     setting = assembly.solver.arrays.setting
     recipe: Recipe = replace(assembly.recipe, materials=False)
-    device = assembly.solver.device
     sample = DemArrays(recipe, replace(setting, gravity=np.zeros(3)), lattice, table, [], [], assembly.pair_table, device)
     solver = ExplicitDem(sample, device, lambda stage, share: check())
     solver.run(1)  # compiles

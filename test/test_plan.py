@@ -14,7 +14,7 @@ from sand_sim.assemble import assemble
 from sand_sim.cli.main import main
 from sand_sim.engine.pair_tiles import build_pair_tiles
 from sand_sim.interruption import InterruptedByUserError
-from sand_sim.plan import make_plan
+from sand_sim.plan import make_plan, measure_cost
 from sand_sim.scene.reading import load_scene, read_scene
 from sand_sim.scene.shapes import TETRAHEDRON
 
@@ -134,6 +134,13 @@ def test_a_run_of_one_grain_costs_what_a_step_takes_without_any(make_world):
     world, steps = make_world([[0.0, 0.0, 0.0]], 0.005, boundaries=floor(-0.1), threads=1), 2000
     taken = quickest(lambda: world.step(steps)) / steps
     assert 0.1 * taken < make_plan(world.assembly).sphere_step < 10.0 * taken
+
+
+def test_a_cost_is_that_of_as_many_threads_as_are_quickest(make_world, monkeypatch):
+    """Where other programs keep a core busy a run soon steps on one thread; on all of them a sample was told twice as dear."""
+    assembly = make_world([[0.0, 0.0, 0.0]], 0.005, threads=2).assembly
+    monkeypatch.setattr("sand_sim.plan.sample_cost", lambda assembly, device, check: {2: 2e-7, 1: 1e-7}[device.lanes])
+    assert measure_cost(assembly) == 1e-7
 
 
 def test_verb_prints_text_and_json(tmp_path, capsys):
