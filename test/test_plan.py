@@ -49,6 +49,16 @@ def test_each_feature_brings_its_own_arrays_and_nothing_else(plan_of):
     assert {name for name in set(walled.arrays) - set(lean.arrays) if "wall" not in name} == set()
 
 
+def test_a_pull_that_ends_where_grains_part_is_not_remembered(plan_of):
+    """A bridge of liquid and a stuck contact act across a gap, so that they must be; the pull of DMT does not."""
+    numbers = {"adhesion": 0.01, "restitution": 0.5}
+    dmt, jkr = (plan_of(contact={"tangential": "none", "cohesion": law}, numbers=numbers) for law in ("dmt", "jkr"))
+    assert not names(dmt, "memory", "drawer")
+    assert "contact history" in dmt.left_out
+    assert names(jkr, "memory")
+    assert "contact history" not in jkr.left_out
+
+
 def test_frictionless_kernels_contain_no_code_of_what_was_left_out(make_world):
     """The source that Warp generates for the pair forces has fewer lines without rotation and friction."""
 

@@ -1,5 +1,7 @@
 """Cohesion laws: ``(contact, pair, memory) -> (attraction [N], memory)``, also across a gap while the memory says so.
 
+Laws that act only where grains touch remember nothing; what they are given as memory is zero.
+
 The attraction is taken off the force of the normal law; friction is bounded by the force of the normal law alone, which includes
 what balances the attraction. ``reach`` gives the widest gap across which a law acts, ``bond`` what it takes to part grains.
 """
@@ -311,7 +313,6 @@ COHESION_LAWS = {
         fields={"adhesion_pull": "[N/m] 2 pi w"},
         prepare=prepare_dmt,
         asks=("adhesion",),
-        memory=(1,),
         bond=dmt_bond,
     ),
     "jkr": CohesionLaw(

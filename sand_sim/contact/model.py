@@ -74,6 +74,11 @@ class ContactModel:
         return self.cohesion != "none"
 
     @property
+    def bonds(self) -> bool:
+        """Whether contacts act across gaps, for which they remember that they have touched."""
+        return bool(self.law("cohesion").memory)
+
+    @property
     def asks(self) -> tuple[str, ...]:
         """Numbers that the scene must give for each pair of materials."""
         return tuple(dict.fromkeys(ask for law in self.laws.values() for ask in law.asks))

@@ -111,7 +111,7 @@ def build_response(model: ContactModel, precision: Precision) -> wp.Function:
     built = {slot: law.build(precision, types) for slot, law in model.laws.items()}
     normal, tangential, rolling, twisting, cohesion = built.values()
     has_tangential, has_rolling, has_twisting = (law is not None for law in (tangential, rolling, twisting))
-    cohesive, memory_vector = model.cohesive, memory_type(model, precision)
+    cohesive, bonds, memory_vector = model.cohesive, model.bonds, memory_type(model, precision)
     slips, rolls = len(model.law("tangential").memory), len(model.law("rolling").memory)
     first_roll, its_twist, its_bond = (model.offset(slot) for slot in ("rolling", "twisting", "cohesion"))
     remembered, fresh = len(model.memory), build_fresh(precision)
@@ -146,14 +146,18 @@ def build_response(model: ContactModel, precision: Precision) -> wp.Function:
         if wp.static(cohesive):
             # Across a gap all that is thrown away; where nothing acts across gaps only touching contacts count.
             touching = contact.overlap > real(0.0)
-            attraction, bond = cohesion(contact, pair, memory[wp.static(its_bond)])
+            bond = real(0.0)
+            if wp.static(bonds):
+                bond = memory[wp.static(its_bond)]
+            attraction, bond = cohesion(contact, pair, bond)
             push = wp.where(touching, push, real(0.0)) - attraction
             for k in range(3):
                 drag[k] = wp.where(touching, drag[k], real(0.0))
                 moment[k] = wp.where(touching, moment[k], real(0.0))
             for k in range(wp.static(remembered)):
                 after[k] = wp.where(touching, after[k], real(0.0))
-            after[wp.static(its_bond)] = bond
+            if wp.static(bonds):
+                after[wp.static(its_bond)] = bond
         return push, drag, moment, after
 
     return response
@@ -165,7 +169,7 @@ def build_stored_energy(model: ContactModel, precision: Precision) -> wp.Functio
     real, vec3, types = precision.real, precision.vec3, model.types(precision)
     built = {slot: law.build_energy and law.build_energy(precision, types) for slot, law in model.laws.items()}
     normal, tangential, rolling, twisting, cohesion = built.values()
-    has = {slot: energy is not None for slot, energy in built.items()}
+    has, bonds = {slot: energy is not None for slot, energy in built.items()}, model.bonds
     slips, rolls = len(model.law("tangential").memory), len(model.law("rolling").memory)
     first_roll, its_twist, its_bond = (model.offset(slot) for slot in ("rolling", "twisting", "cohesion"))
     slip_vector = precision.vec4 if slips == 4 else vec3
@@ -188,7 +192,10 @@ def build_stored_energy(model: ContactModel, precision: Precision) -> wp.Functio
             if wp.static(has["twisting"]):
                 energy += twisting(contact, pair, memory[wp.static(its_twist)])
         if wp.static(has["cohesion"]):
-            energy += cohesion(contact, pair, memory[wp.static(its_bond)])
+            bond = real(0.0)
+            if wp.static(bonds):
+                bond = memory[wp.static(its_bond)]
+            energy += cohesion(contact, pair, bond)
         return energy
 
     return stored_energy

@@ -11,15 +11,15 @@ from sand_sim.integrator import VERLET
 
 @cache
 def build_acts(recipe: Recipe) -> wp.Function:
-    """Warp function ``(contact, touching, memory) -> bool``: whether a contact exerts forces; with cohesion also across a gap."""
+    """Warp function ``(contact, touching, memory) -> bool``: whether a contact exerts forces; with a bond also across a gap."""
     model = recipe.contact
-    cohesive, bond, memory = model.cohesive, model.offset("cohesion"), memory_type(model, recipe.precision)
+    bonds, bond, memory = model.bonds, model.offset("cohesion"), memory_type(model, recipe.precision)
     real = recipe.precision.real
 
     @wp.func
     def acts(contact: int, touching: bool, memory: wp.array(dtype=memory)) -> bool:
         result = touching
-        if wp.static(cohesive):
+        if wp.static(bonds):
             result = touching or memory[contact][wp.static(bond)] > real(0.0)
         return result
 

@@ -26,7 +26,7 @@ _TILE = 64  # contacts; their columns take 10 of the 32 or more KiB of the neare
 def build_pair_tiles(recipe: Recipe) -> wp.Kernel:
     """Kernel for the forces between grains, with the arguments of ``build_pair_forces``."""
     precision, rotation, materials, halves = recipe.precision, recipe.rotation, recipe.materials, recipe.halves
-    history, couples, cohesive = recipe.history, recipe.contact.couples, recipe.contact.cohesive
+    history, couples, bonds = recipe.history, recipe.contact.couples, recipe.contact.bonds
     real, vec3, vec4, whole3, whole4 = precision.real, precision.vec3, precision.vec4, precision.whole3, precision.whole4
     types, memory_vector = recipe.contact.types(precision), memory_type(recipe.contact, precision)
     remembered, bond = len(recipe.contact.memory), recipe.contact.offset("cohesion")
@@ -181,7 +181,7 @@ def build_pair_tiles(recipe: Recipe) -> wp.Kernel:
                     for i in range(wp.static(remembered)):
                         before[i] = memories[i, k]
                 acts = excess > real(0.0)
-                if wp.static(cohesive):
+                if wp.static(bonds):
                     acts = acts or before[wp.static(bond)] > real(0.0)
                 push, drag, resistance, after = response(met, pair, before, dt)
                 pushed = met.normal * push + drag
