@@ -1,5 +1,6 @@
 """From a checked Scene to the arrays of a solver: the only place that knows both."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -215,7 +216,7 @@ def build_solver(assembly: Assembly, setting: Setting, device, progress: Progres
     scene, table, order = assembly.scene, assembly.table, material_order(assembly.scene)
     arrays = DemArrays(
         assembly.recipe,
-        replace(setting, reach=_reach(scene, table, order)),
+        replace(setting, reach=_reach(scene, order)),
         assembly.lattice,
         table,
         make_surfaces(assembly.walls, order, assembly.lattice, min(assembly.smallest.values()), assembly.plungers),
@@ -315,13 +316,11 @@ def _pair_table(scene: Scene, order: list[str], precision: Precision) -> list[li
     return table
 
 
-def _reach(scene: Scene, table: GrainTable, order: list[str]) -> float:
-    """Widest gap across which any contact of the scene acts [m]."""
+def _reach(scene: Scene, order: list[str]) -> Callable[[float], float]:
+    """Widest gap [m] across which any contact acts of which the smaller sphere has at most a radius [m]."""
     law = scene.contact.law("cohesion")
     if scene.contact.cohesion == "none":
-        return 0.0
+        return lambda radius: 0.0
     pairs = [numbers for a in order for b in order if (numbers := pair_numbers(scene, a, b))]
-    sizes = {float(radius) for radius in (table.radius.min(), table.radius.max())}
-    sizes |= {boundary.rough.radius for boundary in scene.boundaries if boundary.rough}
-    # The effective radius of two grains lies between half the smaller and, at a wall, the larger one's radius.
-    return max(law.reach(pair, least, share * least) for pair in pairs for least in sizes for share in (0.5, 1.0))
+    # The effective radius is half of that where two are alike, and all of it at a wall.
+    return lambda radius: max(law.reach(pair, radius, share * radius) for pair in pairs for share in (0.5, 1.0))

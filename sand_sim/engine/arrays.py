@@ -1,6 +1,6 @@
 """All arrays of an explicit DEM world, and only those that its scene needs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,19 +40,14 @@ class Setting:
         dt: time step [s].
         skin: how far two grains may approach each other before the lists are made anew, at most [m].
         radius: of a grain, on the mean [m]; 0 to keep the skin at its widest.
-        reach: widest gap across which a contact acts, zero without cohesion [m].
+        reach: widest gap across which a contact acts, from the radius of its smaller sphere, with which it grows [m].
     """
 
     gravity: np.ndarray
     dt: float
     skin: float
     radius: float = 0.0
-    reach: float = 0.0
-
-    @property
-    def listing_gap(self) -> float:
-        """Widest gap across which a contact is listed [m]."""
-        return self.skin + self.reach
+    reach: Callable[[float], float] = lambda radius: 0.0
 
 
 class DemArrays:
@@ -101,7 +96,7 @@ class DemArrays:
         self.carried_off = wp.zeros(lanes, dtype=wp.float64, device=device)
         self.fastest = wp.zeros(shares, dtype=precision.real, device=device)
 
-        self.cells = prepare_cells(table.radius, setting.listing_gap, lattice, on)
+        self.cells = prepare_cells(table.radius, setting.skin, setting.reach, lattice, on)
         self.in_cells = SortedItems.allocate(self.cells.bins.capacity, 0, on)
         own = {array.dtype: wp.zeros_like(array) for array in (self.grains.motion, self.grains.remainder)}
         others = {array.dtype for array in self.grains.sorted_arrays} - set(own)
@@ -123,7 +118,9 @@ class DemArrays:
         self.wall_list = self._contact_list(_FACES["walls"] * face) if walls else None
         self.plungers = Plungers(list(drives), device) if drives else None
         self.plunger_states = self.plungers.states if drives else None
-        farthest = float(table.radius.max()) + setting.listing_gap
+        largest = float(table.radius.max())
+        self.widest_reach = setting.reach(largest)
+        farthest = largest + setting.skin + self.widest_reach
         self.tools = Tools(tools, farthest, precision, device) if tools else None
         self.tool_list = self._contact_list(_FACES["tools"] * face) if tools else None
         self.touch = self.old_touch = None

@@ -3,6 +3,7 @@
 The grid is laid anew at every search around the grains there are, so that it costs nothing where a domain is empty.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -27,6 +28,7 @@ def level_type(precision: Precision) -> type:
     @wp.struct
     class Level:
         radius: whole  # [quantum] largest radius of the level's spheres
+        across: real  # [quantum] widest gap across which one of them acts on a larger sphere, one of its own level or a surface
         reach: real  # [quantum] smallest allowed cell edge
         inverse_cell: real  # [1/quantum]
         fast: int  # the axis along which cells are numbered first, the shortest: neighbours lie near each other in memory
@@ -58,14 +60,15 @@ class Cells:
     bins: Count
 
 
-def prepare_cells(radii: np.ndarray, skin: float, lattice: Lattice, on) -> Cells:
+def prepare_cells(radii: np.ndarray, skin: float, reach: Callable[[float], float], lattice: Lattice, on) -> Cells:
     """Choose the levels for spheres of the given radii.
 
     A cell is at least as wide as the reach of its level's largest spheres, so that partners lie in the 27 cells around.
 
     Args:
         radii: radii of all spheres, shape (n,) [m].
-        skin: distance beyond touch at which spheres are listed [m].
+        skin: how far two spheres may approach each other before they are sought again, at most [m].
+        reach: widest gap across which spheres act, from the largest radius of the smaller one [m].
         lattice: the domain.
         on: the device, from ``device.open_device``.
     """
@@ -80,7 +83,8 @@ def prepare_cells(radii: np.ndarray, skin: float, lattice: Lattice, on) -> Cells
     for radius in reversed(largest):
         one = level()
         one.radius = int(lattice.to_whole_length(radius)) + 1
-        one.reach = (2.0 * radius + skin) / lattice.quantum * 1.001
+        one.across = reach(radius) / lattice.quantum
+        one.reach = (2.0 * radius + skin + reach(radius)) / lattice.quantum * 1.001
         levels.append(one)
     return Cells(
         levels=wp.array(levels, dtype=level, device=on.name),

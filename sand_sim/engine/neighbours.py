@@ -101,7 +101,6 @@ def build_search(recipe: Recipe, filling: bool, chunk: int) -> wp.Kernel:
         lowest: wp.array(dtype=whole3),
         cell_starts: wp.array(dtype=int),
         allowed: wp.array(dtype=whole),
-        across: real,
         member: wp.array(dtype=int),
         body_of: wp.array(dtype=int),
         hits: wp.array(dtype=int),
@@ -120,7 +119,6 @@ def build_search(recipe: Recipe, filling: bool, chunk: int) -> wp.Kernel:
             i = sure(item)
             here = place[i]
             low = lowest[0]
-            gap = real(here[3] + allowed[i]) + across
             noted = sure(wp.static(HITS) * i + lane * wp.static(chunk))
             found = int(0)
             if wp.static(filling):
@@ -132,6 +130,7 @@ def build_search(recipe: Recipe, filling: bool, chunk: int) -> wp.Kernel:
                         list_pair(sure(found + k), i, j, owner, partner, memory, came_from, old_starts, old_partner, old_memory)
                     continue
             own = level_of(levels, here[3])
+            gap = real(here[3] + allowed[i]) + levels[own].across
             for tier in range(own, levels.shape[0]):
                 one = levels[tier]
                 cell = cell_of(one, low, here)

@@ -194,7 +194,7 @@ def record_touching(arrays, recorder) -> None:
     if tools.smooth:
         inputs = [contacts.owner, contacts.partner, arrays.grains.place, tools.tool_of, tools.states, tools.tracks]
         inputs += [*arguments_of(tools.smooth), arrays.flags.steps_done, arrays.setting.dt, arrays.lattice.quantum]
-        inputs += [arrays.setting.reach, arrays.touch, contacts.memory]
+        inputs += [arrays.widest_reach, arrays.touch, contacts.memory]
         recorder.each(build_touch_smooth(arrays.recipe), contacts.pairs, inputs)
 
 

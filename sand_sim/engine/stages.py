@@ -117,18 +117,18 @@ def sort_stage(arrays: DemArrays, recorder) -> None:
 def list_stage(arrays: DemArrays, recorder) -> None:
     """Find what each grain may touch among grains and walls; count first, so that nothing is written unless all of it fits."""
     grains, flags, cells = arrays.grains, arrays.flags, arrays.cells
-    active, skin, across = grains.active, arrays.skin, arrays.setting.reach / arrays.lattice.quantum
+    active, skin = grains.active, arrays.skin
     precision = arrays.recipe.precision
     chunk = 1 if recorder.wide or grains.capacity < CHUNK else CHUNK
 
     def pairs(filling):
-        inputs = [grains.place, cells.levels, cells.low, arrays.in_cells.starts, arrays.allowed, across]
+        inputs = [grains.place, cells.levels, cells.low, arrays.in_cells.starts, arrays.allowed]
         inputs += [grains.member, arrays.bodies.body_of if arrays.bodies else None, arrays.hits]
         inputs += _list_arguments(arrays, arrays.pair_list)
         recorder.each(neighbours.build_search(arrays.recipe, filling, chunk), active, inputs)
 
     def walls(filling):
-        inputs = [grains.place, arrays.walls, arrays.plunger_states, skin.widest, across]
+        inputs = [grains.place, arrays.walls, arrays.plunger_states, skin.widest, cells.levels]
         inputs += _list_arguments(arrays, arrays.wall_list)
         recorder.each(surface_contacts.build_surface_search(arrays.recipe, filling), active, inputs)
 
@@ -172,7 +172,7 @@ def tool_list_stage(arrays: DemArrays, recorder) -> None:
             tools.particles,
             *arguments_of(tools.smooth),
         ]
-        inputs += [arrays.lattice.quantum, arrays.skin.widest, arrays.setting.reach, *_list_arguments(arrays, arrays.tool_list)]
+        inputs += [arrays.lattice.quantum, arrays.skin.widest, arrays.cells.levels, *_list_arguments(arrays, arrays.tool_list)]
         recorder.each(tool_contacts.build_tool_search(arrays.recipe, filling), grains.active, inputs)
 
     def fill():

@@ -6,6 +6,7 @@ import warp as wp
 
 from sand_sim.contact.response import build_drifting, build_meeting, memory_type
 from sand_sim.engine.act import build_act, build_acts
+from sand_sim.engine.cells import cell_functions, level_type
 from sand_sim.engine.contact_list import build_note
 from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.plungers import PlungerState
@@ -42,6 +43,7 @@ def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
     from_anchor, nearest = build_from_anchor(precision, surfaces), build_nearest(surfaces, listing=True)
     rows_near, columns_near, (_, _, sphere_at) = build_rows_near(), build_columns_near(), build_sphere_at()
     rough, shell, note = ROUGH in surfaces, SHELL in surfaces, build_note(recipe, filling)
+    level, (level_of, _) = level_type(precision), cell_functions(precision)
 
     @kernel
     def surface_search(
@@ -52,7 +54,7 @@ def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         walls: wp.array(dtype=Surface),
         plungers: wp.array(dtype=PlungerState),
         skin: wp.array(dtype=wp.float64),
-        across: wp.float64,
+        levels: wp.array(dtype=level),
         counts: wp.array(dtype=int),
         starts: wp.array(dtype=int),
         owner: wp.array(dtype=int),
@@ -70,7 +72,7 @@ def build_surface_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                 if starts[i + 1] == found:
                     continue  # none was counted
             here = place[i]
-            gap = skin[0] + across
+            gap = skin[0] + wp.float64(levels[level_of(levels, here[3])].across)
             reach = wp.float64(here[3]) + gap
             for w in range(walls.shape[0]):
                 wall = walls[w]

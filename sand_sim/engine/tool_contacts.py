@@ -11,6 +11,7 @@ import warp as wp
 
 from sand_sim.contact.response import build_drifting, build_meeting, memory_type
 from sand_sim.engine.act import build_act, build_acts
+from sand_sim.engine.cells import cell_functions, level_type
 from sand_sim.engine.contact_list import build_note
 from sand_sim.engine.count import count_of, part_start
 from sand_sim.engine.kernel import kernel
@@ -49,6 +50,7 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
     memory_vector = memory_type(recipe.contact, precision)
     shape_type, state_type = tool_types(precision)
     from_tool, note = build_from_tool(precision), build_note(recipe, filling)
+    level, (level_of, _) = level_type(precision), cell_functions(precision)
 
     @kernel
     def tool_search(
@@ -66,7 +68,7 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         corners: wp.array(dtype=wp.vec3d),
         quantum: real,
         skin: wp.array(dtype=wp.float64),
-        across: real,
+        levels: wp.array(dtype=level),
         counts: wp.array(dtype=int),
         starts: wp.array(dtype=int),
         owner: wp.array(dtype=int),
@@ -84,11 +86,13 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                 if starts[i + 1] == found:
                     continue  # none was counted
             here = origin[i]
+            size = place[i][3]
+            across = levels[level_of(levels, size)].across
             for tool in range(shapes.shape[0]):
                 shape = shapes[tool]
                 state = states[tool]
                 away = from_tool(here, state, quantum)
-                reach = (real(place[i][3] + here[3]) + real(wp.float64(0.5) * skin[0])) * quantum + shape.radius + across
+                reach = (real(size + here[3]) + across + real(wp.float64(0.5) * skin[0])) * quantum + shape.radius
                 farthest = shape.extent + reach
                 if wp.dot(away, away) > farthest * farthest:
                     continue

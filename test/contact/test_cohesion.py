@@ -68,6 +68,28 @@ def test_bridge_of_a_liquid_that_wets_less_pulls_less_and_reaches_farther(make_w
     assert gap[pull > 1e-6][-1] == pytest.approx((1.0 + 0.5 * angle) * RUPTURE, rel=1e-2)
 
 
+@pytest.mark.parametrize("radii", [(1.0, 1.0), (1.0, 8.0), (8.0, 8.0)])
+def test_bridges_of_many_sizes_break_where_the_smaller_grain_lets_go(make_world, radii):
+    """Beside grains of other sizes, so that some are sought farther away than others."""
+    small, large = (RADIUS * ratio for ratio in radii)
+    others = [[0.0, 0.1, 0.0], [0.0, 0.2, 0.0], [0.0, 0.3, 0.0]]
+    world = make_world(
+        [[0.0, 0.0, 0.0], [small + large - 1e-9, 0.0, 0.0], *others],
+        [small, large, RADIUS, 8.0 * RADIUS, 3.0 * RADIUS],
+        velocity=[[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0], *np.zeros((3, 3))],
+        restitution=1.0,
+        contact={"cohesion": "capillary"},
+        liquid=LIQUID,
+        threads=1,
+    )
+    rupture, held = LIQUID["bridge_volume"] ** (1.0 / 3.0) * small, 0.0
+    while held < 2.0 * rupture and len(world.grain_contacts()):
+        x = world.observe().grains.position[:2, 0]
+        held = x[1] - x[0] - small - large
+        world.step(1)
+    assert held == pytest.approx(rupture, abs=2.0 * world.time_step)
+
+
 def test_bridge_forms_on_contact_only(make_world):
     """A grain that passes within reach without touching feels nothing; one that touches is held back."""
     common = {"material": {"density": DENSITY, "young": 1e7, "poisson": POISSON}, "contact": {"cohesion": "capillary"}}

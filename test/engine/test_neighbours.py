@@ -45,6 +45,21 @@ def test_every_pair_within_reach_is_listed_once(make_world, sizes, threads):
     assert possible[found[:, 0], found[:, 1]].all()
 
 
+def test_bridges_reach_as_far_as_the_smaller_grain_holds_them(make_world):
+    """Small wet grains listed all that the bridges of the largest would reach: ten times smaller, forty times as many as dry."""
+    position, radius = cloud(700, SIZES["ratio of twenty"], 0.08, seed=1)
+    contact, liquid = {"tangential": "none", "cohesion": "capillary"}, {"bridge_volume": 0.1}
+    world = make_world(position, radius, skin=1e-3, precision="single", contact=contact, liquid=liquid)
+    found, number = listed_pairs(world)
+    distance = np.linalg.norm(position[:, None] - position[None], axis=2)
+    touch, rupture = radius[:, None] + radius[None] + 1e-3, 0.1 ** (1.0 / 3.0) * np.minimum(radius[:, None], radius[None])
+    needed = np.argwhere(np.triu(distance < touch + rupture - 1e-8, k=1))
+    allowed = np.triu(distance < touch + 2.0 * rupture + 1e-8, k=1)  # sizes are told apart by factors of two
+    assert len(found) == number
+    assert {tuple(pair) for pair in needed} <= {tuple(pair) for pair in found}
+    assert allowed[found[:, 0], found[:, 1]].all()
+
+
 @pytest.mark.parametrize("number", [CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK])
 def test_all_of_a_few_are_listed(make_world, number):
     """As many grains as are looked at at once, fewer and more, all within reach of each other."""
