@@ -1,5 +1,6 @@
 """Whether a run can be trusted, and if not, why."""
 
+import re
 from dataclasses import replace
 
 from sand_sim.border import Health
@@ -36,6 +37,11 @@ def find_doubts(health: Health, safe_now: float, beforehand: tuple[str, ...] = (
         share = 100.0 * health.momentum_residual
         doubts.append(f"{share:.2g} % of the forces on grains have no counterpart; a fault of the program, please report it")
     return replace(health, doubts=tuple(doubts))
+
+
+def kind_of(doubt: str) -> str:
+    """What a doubt is about, whatever its numbers are at the moment and what is advised."""
+    return re.sub(r"\S*\d\S*", "#", re.split(r"[;,] ", doubt)[0])
 
 
 def gained_share(health: Health) -> float:

@@ -38,6 +38,31 @@ def test_draft_is_against_the_motion_lift_is_down_and_what_is_lost_is_spilled(tm
     assert told["carried_weight_N"] == pytest.approx((4.0 + 6.0 + 5.0) / 3.0)
 
 
+def test_doubts_that_have_passed_are_told(tmp_path):
+    """Energy from nowhere that has been dissipated since, and grains that were too fast for a while."""
+    world = World(load_scene(write_small_scene(tmp_path)))
+    first, log = world.observe(), RunLog(world.scene)
+    lost, deep = "J appeared from nowhere; take a smaller time step", "% of a radius; stiffen"
+    rows = [  # energy gained, doubts
+        (0.0, ()),
+        (0.2, (f"overlap reached 11.2 {deep}", f"0.2 {lost}", "grains move at 9 m/s, which asks for a time step of 1e-07 s")),
+        (3e-1, (f"overlap reached 12.3 {deep}; or a wall?", f"3e-01 {lost}")),
+        (0.0, (f"overlap reached 12.3 {deep}; or a wall?",)),
+    ]
+    for number, (gained, doubts) in enumerate(rows):
+        log.write(replace(first, time=0.1 * number, steps=number, health=replace(first.health, gained=gained, doubts=doubts)))
+    resumed = RunLog(world.scene)
+    resumed.unpack(log.pack())
+    resumed.last = log.last
+    for told in (log.summarise(), resumed.summarise()):
+        assert told["energy_J"]["gained"] == pytest.approx(0.3)
+        assert told["doubts"] == [
+            f"overlap reached 12.3 {deep}; or a wall?",
+            f"3e-01 {lost} (at t = 0.2 s)",
+            "grains move at 9 m/s, which asks for a time step of 1e-07 s (at t = 0.1 s)",
+        ]
+
+
 @pytest.mark.parametrize("pull", [0.0, 2.0])
 def test_a_tool_that_met_no_grain_is_told(tmp_path, pull):
     """As where a mesh of one's own lies elsewhere in its frame than was thought."""

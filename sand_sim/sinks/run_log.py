@@ -11,9 +11,11 @@ import numpy as np
 from sand_sim.border import Observation, ToolReport
 from sand_sim.scene.types import Scene, Tool
 from sand_sim.track import phases_at, phases_of
+from sand_sim.trust import kind_of
 
 _STILL = 1e-4  # [m/s] horizontal speed below which a tool has no draft
 # What each row holds of the world's health, of every tool, by the attribute of its report, and of every plunger.
+_PEAKS_OF_HEALTH = "momentum_residual", "gained"
 _OF_HEALTH = ("contacts", "deepest", "kinetic", "dissipated", "momentum_residual")
 _OF_TOOL = {name: name for name in ("position", "orientation", "velocity", "torque", "carried")} | {"force": "world_force"}
 _OF_PLUNGER = ("position", "force")
@@ -68,6 +70,7 @@ class RunLog:
         interrupted: whether the user stopped it.
         identity: the same before and after a run has been resumed.
         peaks: largest values of all frames by name, also of those that are given up.
+        doubted: when the run was last doubted [s] and why, by the kind of the doubt, of all frames.
         most_rows: how many are kept; beyond, every other one is given up, and from then on every other frame is written.
     """
 
@@ -80,6 +83,7 @@ class RunLog:
     interrupted: bool = False
     identity: str = field(default_factory=lambda: uuid4().hex)
     peaks: dict[str, float] = field(default_factory=dict)
+    doubted: dict[str, tuple[float, str]] = field(default_factory=dict)
     most_rows: int = 2**31
     _every: int = 1
     _frames: int = 0
@@ -93,7 +97,8 @@ class RunLog:
         self._steps = observation.steps
         for phase in phases_at(self.scene, observation.time):
             self.views[phase] = View.of(observation)
-        seen = {"momentum_residual": health.momentum_residual}
+        self.doubted |= {kind_of(doubt): (observation.time, doubt) for doubt in health.doubts}
+        seen = {name: getattr(health, name) for name in _PEAKS_OF_HEALTH}
         for tool in observation.tools:
             seen |= {f"{tool.name}.{name}": value for name, value in _loads_of(tool).items()}
         self.peaks |= {name: max(self.peaks.get(name, 0.0), float(value)) for name, value in seen.items()}  # past NaN
@@ -121,7 +126,7 @@ class RunLog:
     @property
     def _peak_names(self) -> set[str]:
         """Of all peaks."""
-        return {"momentum_residual"} | {f"{tool.name}.{name}" for tool in self.scene.tools for name in _LOADS}
+        return {*_PEAKS_OF_HEALTH} | {f"{tool.name}.{name}" for tool in self.scene.tools for name in _LOADS}
 
     @property
     def _plungers(self) -> set[str]:
@@ -142,6 +147,7 @@ class RunLog:
         packed = {"identity": np.array(self.identity), "thinned": np.array([self._every, self._frames, self._steps])}
         packed |= {f"row/{name}": column for name, column in self.columns().items()}
         packed |= {f"peak/{name}": np.array(value) for name, value in self.peaks.items()}
+        packed["doubts"] = np.array([[repr(float(time)), doubt] for time, doubt in self.doubted.values()], str).reshape(-1, 2)
         return packed | {f"view/{phase}/{name}": array for phase, items in views.items() for name, array in items}
 
     def unpack(self, packed: dict[str, np.ndarray]) -> None:
@@ -167,6 +173,7 @@ class RunLog:
             views = {phase: View(**parts) for phase, parts in views.items()}
             peaks = {name: float(peak) for name, peak in peaks.items()}
             wall = float(rows[-1]["wall"]) if rows else 0.0
+            doubts = {kind_of(str(doubt)): (float(time), str(doubt)) for time, doubt in packed.get("doubts", ())}
             every, frames, steps = (int(number) for number in packed.get("thinned", (1, 0, -1)))
         except TypeError as error:
             raise ValueError(f"history: {error}") from None
@@ -174,6 +181,7 @@ class RunLog:
             raise ValueError(f"history: every {every}th frame")
         self.rows, self.views, self.started = rows, views, time.monotonic() - wall
         self.peaks, self._every, self._frames, self._steps = peaks, every, frames, steps
+        self.doubted = doubts
         self.identity = str(packed.get("identity", self.identity))
 
     def summarise(self) -> dict:
@@ -181,9 +189,10 @@ class RunLog:
         if self.last is None:
             return {"steps": 0}
         columns, health = self.columns(), self.last.health
-        energies = {
-            name: getattr(health, name) for name in ("tool_work", "kinetic", "potential", "elastic", "dissipated", "gained")
-        }
+        energies = {name: getattr(health, name) for name in ("tool_work", "kinetic", "potential", "elastic", "dissipated")}
+        energies["gained"] = self.peaks["gained"]  # what is dissipated afterwards hides it
+        lasting = {kind_of(doubt) for doubt in health.doubts}
+        passed = [f"{doubt} (at t = {time:.3g} s)" for kind, (time, doubt) in self.doubted.items() if kind not in lasting]
         summary = {
             "grains": len(self.last.grains),
             "retired_grains": health.retired,
@@ -197,7 +206,7 @@ class RunLog:
             "largest_momentum_residual": self.peaks["momentum_residual"],
             "largest_overlap_over_radius": health.deepest,
             "energy_J": energies,
-            "doubts": [*health.doubts, *([self.fault] if self.fault else [])],
+            "doubts": [*health.doubts, *passed, *([self.fault] if self.fault else [])],
             "tools": {tool.name: _summarise_tool(columns, tool, self.peaks) for tool in self.scene.tools},
         }
         return json.loads(json.dumps(summary, default=float))

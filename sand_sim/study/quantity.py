@@ -11,6 +11,7 @@ from sand_sim.playing import commands_at, frame_times
 from sand_sim.scene.types import Scene, SceneError
 from sand_sim.study.impact import Impact
 from sand_sim.study.sample import Sample
+from sand_sim.trust import kind_of
 from sand_sim.world import World
 
 SMOOTHED = 0.1  # of the duration: standard width of the moving mean over histories
@@ -38,7 +39,7 @@ def play(world: World, look: Callable[[Observation], dict], check: Callable[[], 
     """
     world.step(1)  # kernels are compiled and recorded before the clock starts
     world.reset()
-    rows, times, spent, seen = [], [], 0.0, world.observe()
+    rows, times, spent, seen, doubts = [], [], 0.0, world.observe(), {}
     for moment in frame_times(world.scene):
         check()
         for command in commands_at(world.scene, moment):
@@ -50,10 +51,11 @@ def play(world: World, look: Callable[[Observation], dict], check: Callable[[], 
         seen = world.observe()
         times.append(seen.time)
         rows.append(look(seen))
+        doubts |= {kind_of(doubt): doubt for doubt in seen.health.doubts}  # also those that pass
     if not rows:
         raise SceneError("duration: is less than half a frame, so there is nothing to compare; make it longer")
     values = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    return Sample(np.array(times), values, spent, seen.steps, world.time_step, seen.health.doubts)
+    return Sample(np.array(times), values, spent, seen.steps, world.time_step, tuple(doubts.values()))
 
 
 class Wrench:
