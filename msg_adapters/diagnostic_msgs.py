@@ -17,9 +17,10 @@ def health_to_diagnostics(
         name: of the status.
         hardware_id: device the run is on.
         further: more values to show.
-        state: message if nothing speaks against the run.
+        state: what the run does now; also the message if nothing speaks against the run.
     """
     values = {
+        "state": state,
         "time step [s]": f"{health.time_step:.6g}",
         "time step / safe step": f"{health.step_ratio:.3f}",
         "largest overlap / radius": f"{health.deepest:.4g}",

@@ -62,6 +62,8 @@ class Diagnosis:
         return message
 
     def _state(self) -> str:
+        if self._simulation.fault is not None:
+            return "stopped"
         if self._simulation.paused:
             return "paused"
         if self._simulation.pacing != "lockstep":

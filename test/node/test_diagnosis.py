@@ -83,3 +83,15 @@ def test_the_worst_decides_how_bad_it_is(told):
     told.simulation.fault = RuntimeError("grain 3 is gone")
     status, _ = told.after(1.0, 0.5, ["no room"])
     assert (status.level, status.message) == (DiagnosticStatus.ERROR, "stepping has stopped: grain 3 is gone")
+
+
+def test_what_it_waits_for_is_told_beside_doubts(told):
+    """A doubt stays until a reset; whoever looks why time stands still then must not read of overlaps only."""
+    told.simulation.pacing, told.simulation.courses.by_tool = "lockstep", {"plate": None}
+    told.simulation.courses.awaited = lambda: ["plate"]
+    status, values = told.after(1.0, 0.5, doubts=("too deep",))
+    assert (status.message, values["state"]) == ("too deep", "in lockstep: waiting for the next command of plate")
+    told.simulation.paused = True
+    assert told.after(1.0, 0.5, doubts=("too deep",))[1]["state"] == "paused"
+    told.simulation.fault = RuntimeError("grain 3 is gone")
+    assert told.after(1.0, 0.5)[1]["state"] == "stopped"
