@@ -8,6 +8,7 @@ Pacing:
 Which commands are taken, and when each begins, is told in ``courses.py``.
 """
 
+import atexit
 import threading
 import time
 from collections import Counter, deque
@@ -73,18 +74,16 @@ class Simulation:
         self.courses = Courses(world, pacing == "lockstep", rules)
         self.fault: Exception | None = None
         self.rejected: Counter[str] = Counter()
-        self.last_rejection = ""
-        self.step_time = 0.0
+        self.last_rejection, self.step_time = "", 0.0
         self._on_frame, self._on_fault, self._on_reject = on_frame, on_fault, on_reject
         self._checkpoints, self._pack_history, self._unpack_history = checkpoints, pack_history, unpack_history
         self._writer = ThreadPoolExecutor(1, thread_name_prefix="sand_sim state")
         self._wake, self._counting = threading.Condition(), threading.Lock()
         self._inbox: deque[Command] = deque()
         self._requests: deque[tuple[Callable[[], Any], Future]] = deque()
-        self._paused = self._stopping = False
-        self._due = (0.0, 0.0)
+        self._paused, self._stopping, self._due = False, False, (0.0, 0.0)
         self._frame_end = world.time + self.frame
-        self._thread = threading.Thread(target=self._run, name="sand_sim stepping")
+        self._thread = threading.Thread(target=self._run, name="sand_sim stepping", daemon=True)
 
     @property
     def frame(self) -> float:
@@ -98,6 +97,7 @@ class Simulation:
 
     def start(self) -> None:
         """Begin to step."""
+        atexit.register(self.stop)  # a process that fails before that would wait for ever for a thread that waits for commands
         self._thread.start()
 
     def stop(self) -> None:
@@ -107,6 +107,7 @@ class Simulation:
             self._wake.notify_all()
         if self._thread is threading.current_thread():
             return
+        atexit.unregister(self.stop)
         if self._thread.ident is not None:
             self._thread.join()
         self._writer.shutdown()
@@ -293,10 +294,9 @@ class Simulation:
     def _reset(self) -> None:
         before = self.world.time
         self.world.reset()
-        self.fault = None
+        self.fault, self._due = None, (0.0, 0.0)
         self.courses.clear()
         self.courses.heed_late_ones(before)
-        self._due = (0.0, 0.0)
         self._frame_end = self.world.time + self.frame
         self._on_frame(self.world.observe())
 

@@ -1,5 +1,7 @@
 """Pacing, commands and requests of a running world, without ROS."""
 
+import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import CancelledError
@@ -241,3 +243,26 @@ def test_whoever_waits_is_answered_when_an_error_ends_the_stepping(scene):
     assert running.faults == [simulation.fault]
     assert simulation.step().cancelled()
     simulation.stop()
+
+
+ABANDONED = """
+import sys
+from pathlib import Path
+
+from sand_sim import World, load_scene
+from sand_sim.simulation import Simulation
+
+simulation = Simulation(World(load_scene(Path(sys.argv[1]))), sys.argv[2])
+simulation.start()
+simulation.step().result()
+raise SystemExit("whoever was to stop it has failed")
+"""
+
+
+@pytest.mark.parametrize("pacing", ["lockstep", "realtime", "fast"])
+def test_a_process_that_has_failed_ends(tmp_path, pacing):
+    """As a test or a controller of a user's, which broke off before it could stop what it hosts: nothing waits for ever."""
+    command = [sys.executable, "-c", ABANDONED, write_small_scene(tmp_path), pacing]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.splitlines() == ["whoever was to stop it has failed"]
