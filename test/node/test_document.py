@@ -23,15 +23,34 @@ from sand_sim.config_folder import find_scene
 DOCUMENT = Path(__file__).parents[2] / "docs" / "node.md"
 
 
-def test_documented_tests_pass_beside_each_other(tmp_path):
+def shown_tests():
     section = DOCUMENT.read_text().partition("## In tests of your own")[2]
-    shown = re.search(r"```python\n(.*?)```", section, re.DOTALL).group(1)
-    for name in ("one", "other"):
-        (tmp_path / f"test_{name}.py").write_text(shown)
+    return re.search(r"```python\n(.*?)```", section, re.DOTALL).group(1)
+
+
+def run_tests(folder, *options):
+    """What pytest prints about the tests in a folder."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
-    command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "loadfile", "-p", "no:cacheprovider", tmp_path]
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120, check=False)
-    assert "2 passed" in done.stdout, done.stdout + done.stderr
+    command = [sys.executable, "-m", "pytest", "-q", *options, "-p", "no:cacheprovider", folder]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    return done.stdout + done.stderr
+
+
+def test_documented_tests_pass_beside_each_other(tmp_path):
+    for name in ("one", "other"):
+        (tmp_path / f"test_{name}.py").write_text(shown_tests())
+    told = run_tests(tmp_path, "-n", "2", "--dist", "loadfile")
+    assert "2 passed" in told, told
+
+
+def test_documented_fixture_leaves_the_next_test_alone_when_a_scene_cannot_work(tmp_path):
+    spoilt = shown_tests().replace("  plate: {mesh: plate.stl, material: steel,", "  plate: {mesh: plate.stl, material: stone,")
+    assert spoilt != shown_tests()
+    again = "\n\ndef test_again(executor):\n    pass\n"
+    (tmp_path / "test_spoilt.py").write_text(spoilt + again)
+    told = run_tests(tmp_path)
+    assert "2 errors" in told, told
+    assert len(re.findall(r"^E +\S*SceneError:", told, re.MULTILINE)) == 2, "the second must not blame the first"
 
 
 @pytest.mark.parametrize("name", ["left", "right"])
