@@ -9,6 +9,7 @@ from sampler.rows import ROW
 from sampler.skin import Skin, halve_triangles, longest_edges
 
 _PIECE = 0.5  # longest edge of pieces that are asked, in spacings
+_WIDE = 4.0  # longest edge that counts at most, in roots of the area: needles would become very many
 _TOGETHER = 0.3  # width of cells whose pieces are asked together, in spacings
 _LEAST = 1.2  # times its area that a piece must want before it gets more
 
@@ -68,11 +69,10 @@ def with_rows(skin: Skin, spacing: float) -> Skin:
         skin: that particles are to cover.
         spacing: of these [m].
     """
-    parent, pieces, size = np.arange(len(skin.triangles)), skin.triangles, longest_edges(skin.triangles)
-    while np.any(large := size > _PIECE * spacing):
+    parent, pieces = np.arange(len(skin.triangles)), skin.triangles
+    while np.any(large := np.minimum(longest_edges(pieces), _WIDE * np.sqrt(Skin.areas_of(pieces))) > _PIECE * spacing):
         pieces = np.concatenate([pieces[~large], halve_triangles(pieces[large])])
         parent = np.concatenate([parent[~large], np.tile(parent[large], 2)])
-        size = longest_edges(pieces)
     whole = Skin.areas_of(skin.triangles)
     area = Skin.areas_of(pieces) * (skin.areas / whole)[parent]
     places = pieces.mean(axis=1) / spacing

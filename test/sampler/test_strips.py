@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from sampler import sample_body
-from sampler.skin import Skin
+from sampler.skin import Skin, halve_triangles
 from sampler.strips import with_rows
 
 H, RADIUS = 0.01, 0.01 / 1.5  # the spacing that a radius stands for
@@ -94,3 +94,14 @@ def test_what_is_wide_keeps_the_layers_it_counts_as_beside_strips():
     areas = with_rows(Skin(triangles, "cpu", np.array([1.0] * 2 + [2.0] * 4)), H).areas
     assert areas[:2].sum() == pytest.approx(0.87 * H**2)
     assert areas[2:] == pytest.approx(np.full(4, 0.25 * 2.0 * H * LONG))
+
+
+def test_a_long_wire_is_cut_into_few_pieces(monkeypatch):
+    # Ten thousand times as long as thick: cut at their longest edges alone, its needles became millions.
+    cut = []
+    monkeypatch.setattr(
+        "sampler.strips.halve_triangles", lambda triangles: cut.append(len(triangles)) or halve_triangles(triangles)
+    )
+    wire = trimesh.creation.cylinder(1e-4, 1.0, sections=8)
+    with_rows(Skin(np.asarray(wire.triangles)), 8e-4)
+    assert 0 < sum(cut) < 100 * 1.0 / 8e-4
