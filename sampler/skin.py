@@ -270,6 +270,32 @@ def halve_triangles(triangles: np.ndarray) -> np.ndarray:
     return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
 
 
+def slices(triangles: np.ndarray, wide: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles, shape (n, 3, 3) [m], cut straight across their longest edge into slices no wider than so far [m].
+
+    Returns:
+        Centroids of the slices, shape (m, 3) [m]; their shares of the area, shape (m,); the triangle of each, shape (m,).
+    """
+    a, b, c = _longest_edge_first(triangles)
+    edge = b - a
+    foot = np.clip(np.einsum("ij,ij->i", c - a, edge) / np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-300), 1e-9, 1.0 - 1e-9)
+    number = np.ceil(np.linalg.norm(edge, axis=1) / wide).astype(int)
+    face = np.repeat(np.arange(len(triangles)), number)
+    first = (np.arange(len(face)) - np.repeat(np.cumsum(number) - number, number)) / number[face]
+    a, edge, foot = a[face], edge[face], foot[face]
+    rise = c[face] - a - foot[:, None] * edge
+    # Moments of the height above the edge, which is 1 at the foot, from the edge's begin; from the foot on it falls.
+    moments = np.zeros((3, len(face)))  # of the height itself, times the way along the edge, and half of its square
+    for end, sign in ((first, -1.0), (first + 1.0 / number[face], 1.0)):
+        u, v = np.minimum(end, foot), 1.0 - np.maximum(end, foot)
+        left, right = u**2 / foot, ((1.0 - foot) ** 2 - v**2) / (1.0 - foot)
+        moments[0] += sign * 0.5 * (left + right)
+        moments[1] += sign * (u**3 / foot / 3.0 + 0.5 * right - ((1.0 - foot) ** 3 - v**3) / (1.0 - foot) / 3.0)
+        moments[2] += sign * (u**3 / foot**2 + ((1.0 - foot) ** 3 - v**3) / (1.0 - foot) ** 2) / 6.0
+    along, high = moments[1:] / np.maximum(moments[0], 1e-300)
+    return a + along[:, None] * edge + high[:, None] * rise, 2.0 * moments[0], face
+
+
 def _longest_edge_first(triangles: np.ndarray) -> np.ndarray:
     """Corners of triangles, shape (n, 3, 3) [m], the longest edge from the first to the second; shape (3, n, 3)."""
     edge = lengths(triangles - triangles[:, [1, 2, 0]])

@@ -6,10 +6,10 @@ import warp as wp
 from sampler.cells import Cells, cell_at, row_of, sort_into_cells
 from sampler.launching import launch_shares
 from sampler.rows import ROW
-from sampler.skin import Skin, halve_triangles, longest_edges
+from sampler.skin import Skin, halve_triangles, longest_edges, slices
 
 _PIECE = 0.5  # longest edge of pieces that are asked, in spacings
-_WIDE = 4.0  # longest edge that counts at most, in roots of the area: needles would become very many
+_SLIM = 0.5  # triangles less high than this share of that are cut across their longest edge: halved, needles would breed
 _TOGETHER = 0.3  # width of cells whose pieces are asked together, in spacings
 _LEAST = 1.2  # times its area that a piece must want before it gets more
 
@@ -69,13 +69,10 @@ def with_rows(skin: Skin, spacing: float) -> Skin:
         skin: that particles are to cover.
         spacing: of these [m].
     """
-    parent, pieces = np.arange(len(skin.triangles)), skin.triangles
-    while np.any(large := np.minimum(longest_edges(pieces), _WIDE * np.sqrt(Skin.areas_of(pieces))) > _PIECE * spacing):
-        pieces = np.concatenate([pieces[~large], halve_triangles(pieces[large])])
-        parent = np.concatenate([parent[~large], np.tile(parent[large], 2)])
+    places, areas, parent = _pieces(skin.triangles, _PIECE * spacing)
     whole = Skin.areas_of(skin.triangles)
-    area = Skin.areas_of(pieces) * (skin.areas / whole)[parent]
-    places = pieces.mean(axis=1) / spacing
+    area = areas * (skin.areas / whole)[parent]
+    places = places / spacing
     cell = np.floor(places / _TOGETHER).astype(np.int64)
     cell -= cell.min(axis=0)
     _, which = np.unique(np.ravel_multi_index(cell.T, cell.max(axis=0) + 1), return_inverse=True)
@@ -86,6 +83,25 @@ def with_rows(skin: Skin, spacing: float) -> Skin:
     if np.all(wanted == 1.0):
         return skin
     return Skin(skin.triangles, skin.device, whole / np.bincount(parent, area * wanted[which], len(whole)))
+
+
+def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pieces of triangles, none longer than so far [m].
+
+    Returns:
+        Their centroids, shape (n, 3) [m]; areas, shape (n,) [m^2]; the triangle that each is of, shape (n,).
+    """
+    parent, found = np.arange(len(triangles)), []
+    while len(triangles):
+        edge, area = longest_edges(triangles), Skin.areas_of(triangles)
+        small = edge <= longest
+        slim = ~small & (2.0 * area < _SLIM * edge * longest)
+        places, shares, which = slices(triangles[slim], longest)
+        found += [(triangles[small].mean(axis=1), area[small], parent[small])]
+        found += [(places, shares * area[slim][which], parent[slim][which])]
+        rest = ~(small | slim)
+        triangles, parent = halve_triangles(triangles[rest]), np.tile(parent[rest], 2)
+    return tuple(map(np.concatenate, zip(*found, strict=True)))
 
 
 def _wanted(places: np.ndarray, areas: np.ndarray, device: str) -> np.ndarray:

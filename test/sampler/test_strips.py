@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from sampler import sample_body
-from sampler.skin import Skin, halve_triangles
+from sampler import sample_body, strips
+from sampler.skin import Skin, halve_triangles, slices
 from sampler.strips import with_rows
 
 H, RADIUS = 0.01, 0.01 / 1.5  # the spacing that a radius stands for
@@ -97,11 +97,20 @@ def test_what_is_wide_keeps_the_layers_it_counts_as_beside_strips():
 
 
 def test_a_long_wire_is_cut_into_few_pieces(monkeypatch):
-    # Ten thousand times as long as thick: cut at their longest edges alone, its needles became millions.
-    cut = []
-    monkeypatch.setattr(
-        "sampler.strips.halve_triangles", lambda triangles: cut.append(len(triangles)) or halve_triangles(triangles)
-    )
+    # Ten thousand times as long as thick: halved at their longest edges alone, its needles became millions.
+    asked = []
+    monkeypatch.setattr(strips, "_wanted", lambda places, areas, device: asked.append(len(areas)) or np.ones(len(areas)))
+    monkeypatch.setattr(strips, "halve_triangles", lambda triangles: asked.append(len(triangles)) or halve_triangles(triangles))
     wire = trimesh.creation.cylinder(1e-4, 1.0, sections=8)
     with_rows(Skin(np.asarray(wire.triangles)), 8e-4)
-    assert 0 < sum(cut) < 100 * 1.0 / 8e-4
+    assert 2500 < sum(asked) < 16 * 2500 + 100  # 1.0 / (0.5 * 8e-4) slices along each of its sides
+
+
+def test_slices_are_the_whole_triangle():
+    triangles = np.random.default_rng(0).normal(size=(50, 3, 3))
+    places, shares, face = slices(triangles, 0.05)
+    assert np.bincount(face, shares) == pytest.approx(np.ones(50), rel=1e-12)
+    middle = np.stack([np.bincount(face, shares * x) for x in places.T], axis=1)
+    assert middle == pytest.approx(triangles.mean(axis=1), abs=1e-12)
+    along = np.linalg.norm(np.diff(places, axis=0), axis=1)[np.diff(face) == 0]
+    assert along.max() < 4.0 * 0.05
