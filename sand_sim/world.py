@@ -149,8 +149,8 @@ class World(Changeable):
         if speed > fastest * SPEED_TOLERANCE:
             raise CommandError(
                 "too_fast",
-                f"{tool} would move at {speed:.3g} m/s, its max_speed is {fastest:.3g} m/s; "
-                "command nearer poses or later times, or raise max_speed in the scene",
+                f"{tool} would move at {speed:.3g} m/s, its max_speed is {fastest:.3g} m/s; from where it is, "
+                f"{begin_position.round(4).tolist()}, command nearer poses or later times, or raise max_speed in the scene",
             )
         track = Track(begin, end, begin_position, command.position, begin_orientation, command.orientation)
         self._swept.pass_by(index, begin_position, begin_orientation)

@@ -179,6 +179,15 @@ def test_bad_commands_are_rejected_and_change_nothing(make_plate_world, command,
     assert all(np.array_equal(before[name], after[name]) for name in before)
 
 
+def test_a_command_that_is_too_far_away_is_told_where_the_tool_is(make_plate_world):
+    """As by an arm that starts elsewhere than the scene has its tool."""
+    world = make_plate_world([[0.0, 0.0, 0.05]])
+    world.apply(ToolPose("plate", np.array([0.01, 0.0, 0.02]), NO_TURN, 0.2))
+    world.step(round(0.25 / world.time_step))
+    with pytest.raises(CommandError, match=r"from where it is, \[0\.01, 0\.0, 0\.02\],"):
+        world.apply(ToolPose("plate", np.array([1.0, 0.0, 0.0]), NO_TURN, 0.26))
+
+
 def test_saved_state_goes_on_to_the_bit(make_plate_world):
     position = np.column_stack([np.linspace(-0.02, 0.02, 9), np.zeros(9), np.linspace(0.008, 0.09, 9)])
     common = {"gravity": [0.0, 0.0, -9.81], "precision": "single"}
