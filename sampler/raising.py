@@ -15,6 +15,7 @@ _HOLD = 0.02  # weight of the flat cap beside the planes, which otherwise may no
 _STEEP = 1.5  # times its distance from the rim a place moves at most: the corner of a box is 1.4 times as high
 _PLANE = 1e-3  # of its own length a rim leaves a plane at most that it lies in
 _PAIRS = 1_000_000  # places times rim edges, as many as are held at once
+_COMPARED = 500  # faces along a rim are compared each with each
 
 
 def raise_caps(
@@ -32,7 +33,7 @@ def raise_caps(
     Returns:
         Vertices with new ones at the end, shape (n + more, 3) [m]; faces of the caps and their components, shapes (j, 3), (j,).
     """
-    number = len(vertices)
+    number = count = len(vertices)
     side = (faces * number + np.roll(faces, -1, axis=1)).ravel()
     order = np.argsort(side)
     side = side[order]
@@ -44,8 +45,9 @@ def raise_caps(
         beyond = np.searchsorted(side, sought).clip(max=len(side) - 1)
         narrow = Surface.areas_of(vertices[cap]).sum() < most[component]
         if narrow and np.all(side[beyond] == sought) and not _plane(vertices[loop]):
-            middles, cap = _split(vertices, cap, sum(map(len, points)))
+            middles, cap = _split(vertices, cap, count)
             points.append(_raised(middles, vertices[loop], vertices[faces[order[beyond] // 3]]))
+            count += len(middles)
         raised.append(cap)
         owner.append(np.full(len(cap), component))
     return np.concatenate(points), np.concatenate(raised), np.concatenate(owner)
@@ -54,7 +56,7 @@ def raise_caps(
 def _plane(rim: np.ndarray) -> bool:
     """Whether the corners of a rim, shape (n, 3) [m], lie in a plane."""
     off = rim - rim.mean(axis=0)
-    return bool(np.linalg.svd(off, compute_uv=False)[-1] < _PLANE * np.ptp(off, axis=0).max() * np.sqrt(len(rim)))
+    return bool(np.linalg.svd(off, compute_uv=False)[-1] <= _PLANE * np.ptp(off, axis=0).max() * np.sqrt(len(rim)))
 
 
 def _split(vertices: np.ndarray, cap: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
@@ -89,10 +91,13 @@ def _raised(places: np.ndarray, rim: np.ndarray, beyond: np.ndarray) -> np.ndarr
     """
     normal = np.cross(beyond[:, 1] - beyond[:, 0], beyond[:, 2] - beyond[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    angle = np.arccos(np.clip(normal @ normal.T, -1.0, 1.0))
-    share = 0.5 + 0.5 * np.diagonal(np.roll(angle, -1, axis=0)).max() / max(angle.max(), 1e-9)
+    some = normal[:: 1 + len(normal) // _COMPARED]
+    cosines = np.einsum("ij,ij->i", normal, np.roll(normal, 1, axis=0)), some @ some.T
+    sharpest, widest = (np.arccos(np.clip(values.min(), -1.0, 1.0)) for values in cosines)
+    share = 0.5 + 0.5 * sharpest / max(widest, sharpest, 1e-9)
     along = np.roll(rim, -1, axis=0) - rim
     length = np.linalg.norm(along, axis=1)
+    planes = np.einsum("ij,il->ijl", normal, normal).reshape(-1, 9)
     moved = []
     for place in np.array_split(places, 1 + len(places) * len(rim) // _PAIRS):
         t = np.einsum("kij,ij->ki", place[:, None] - rim, along) / np.maximum(length**2, 1e-300)
@@ -100,8 +105,8 @@ def _raised(places: np.ndarray, rim: np.ndarray, beyond: np.ndarray) -> np.ndarr
         distance = np.maximum(np.linalg.norm(from_rim, axis=2), 1e-9 * length.sum())
         weight = length / distance**2
         weight /= weight.sum(axis=1, keepdims=True)
-        square = np.einsum("ki,ij,il->kjl", weight, normal, normal) + _HOLD * np.eye(3)
-        pull = np.einsum("ki,kil,il,ij->kj", weight, from_rim, normal, normal)
+        square = (weight @ planes).reshape(-1, 3, 3) + _HOLD * np.eye(3)
+        pull = (weight * np.einsum("kij,ij->ki", from_rim, normal)) @ normal
         move = -share * np.linalg.solve(square, pull[..., None])[..., 0]
         most = _STEEP * distance.min(axis=1) / np.maximum(np.linalg.norm(move, axis=1), 1e-300)
         moved.append(place + np.minimum(1.0, most)[:, None] * move)
