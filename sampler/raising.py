@@ -2,7 +2,7 @@
 
 A rim that lies in a plane is taken for a cut, a wide hole for the mouth of a vessel; their caps stay flat. Others are split once,
 and each new place is where the planes of the faces along the rim meet best (quadric error, Garland & Heckbert 1997), near ones
-above all.
+above all. Places that would move through faces stay.
 """
 
 import numpy as np
@@ -33,11 +33,12 @@ def raise_caps(
     Returns:
         Vertices with new ones at the end, shape (n + more, 3) [m]; faces of the caps and their components, shapes (j, 3), (j,).
     """
-    number = count = len(vertices)
+    number = len(vertices)
     side = (faces * number + np.roll(faces, -1, axis=1)).ravel()
     order = np.argsort(side)
     side = side[order]
-    points, raised, owner = [vertices], [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)]
+    around, points, count = None, [vertices], number
+    raised, owner = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)]
     by_loop = np.split(np.flatnonzero(taken), np.flatnonzero(np.diff(caps.loop[taken])) + 1) if taken.any() else []
     for group in by_loop:
         cap, loop, component = caps.faces[group], caps.loops[caps.loop[group[0]]], caps.owner[group[0]]
@@ -45,12 +46,25 @@ def raise_caps(
         beyond = np.searchsorted(side, sought).clip(max=len(side) - 1)
         narrow = Surface.areas_of(vertices[cap]).sum() < most[component]
         if narrow and np.all(side[beyond] == sought) and not _plane(vertices[loop]):
+            around = around or Surface(vertices[faces])
             middles, cap = _split(vertices, cap, count)
-            points.append(_raised(middles, vertices[loop], vertices[faces[order[beyond] // 3]]))
+            points.append(_moved(around, middles, _meeting(middles, vertices[loop], vertices[faces[order[beyond] // 3]])))
             count += len(middles)
         raised.append(cap)
         owner.append(np.full(len(cap), component))
     return np.concatenate(points), np.concatenate(raised), np.concatenate(owner)
+
+
+def _moved(around: Surface, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Places, shape (n, 3) [m], moved, but for those with a face on their way, as of the other skin of a thin wall."""
+    way = end - begin
+    length = np.linalg.norm(way, axis=1)
+    far = np.flatnonzero(length > 1e-9 * around.unit)
+    face, free = around.cast(begin[far], way[far] / length[far, None])
+    place = end.copy()
+    stay = far[(face >= 0) & (free < length[far])]
+    place[stay] = begin[stay]
+    return place
 
 
 def _plane(rim: np.ndarray) -> bool:
@@ -78,8 +92,8 @@ def _split(vertices: np.ndarray, cap: np.ndarray, first: int) -> tuple[np.ndarra
     return vertices[edges.ends[inner]].mean(axis=1), np.array(faces, np.int64)
 
 
-def _raised(places: np.ndarray, rim: np.ndarray, beyond: np.ndarray) -> np.ndarray:
-    """Move places of a flat cap to where the planes beyond its rim meet.
+def _meeting(places: np.ndarray, rim: np.ndarray, beyond: np.ndarray) -> np.ndarray:
+    """Where, near places of a flat cap, the planes beyond its rim meet.
 
     Around a smooth surface these meet twice as high as it is, at an edge or a corner just there. How much of the way is right is
     told by the sharpest turn from one face to the next, beside the widest between any two.
@@ -98,7 +112,7 @@ def _raised(places: np.ndarray, rim: np.ndarray, beyond: np.ndarray) -> np.ndarr
     along = np.roll(rim, -1, axis=0) - rim
     length = np.linalg.norm(along, axis=1)
     planes = np.einsum("ij,il->ijl", normal, normal).reshape(-1, 9)
-    moved = []
+    found = []
     for place in np.array_split(places, 1 + len(places) * len(rim) // _PAIRS):
         t = np.einsum("kij,ij->ki", place[:, None] - rim, along) / np.maximum(length**2, 1e-300)
         from_rim = place[:, None] - rim - np.clip(t, 0.0, 1.0)[..., None] * along
@@ -109,5 +123,5 @@ def _raised(places: np.ndarray, rim: np.ndarray, beyond: np.ndarray) -> np.ndarr
         pull = (weight * np.einsum("kij,ij->ki", from_rim, normal)) @ normal
         move = -share * np.linalg.solve(square, pull[..., None])[..., 0]
         most = _STEEP * distance.min(axis=1) / np.maximum(np.linalg.norm(move, axis=1), 1e-300)
-        moved.append(place + np.minimum(1.0, most)[:, None] * move)
-    return np.concatenate(moved)
+        found.append(place + np.minimum(1.0, most)[:, None] * move)
+    return np.concatenate(found)

@@ -84,3 +84,14 @@ def test_only_whole_caps_that_are_asked_for_are_raised():
     assert one.is_watertight
     assert one.is_winding_consistent
     assert len(raise_caps(vertices, faces, caps, np.zeros(len(caps.faces), bool), wide)[1]) == 0
+
+
+def test_caps_are_not_raised_through_other_faces():
+    # The corner of a box is missing, and a smaller box stands where it was.
+    box = trimesh.creation.box((1.0, 1.0, 1.0)).subdivide().subdivide().subdivide()
+    box = without(box, np.linalg.norm(box.triangles_center - 0.5, axis=1) < 0.45)
+    other = trimesh.creation.box((0.1, 0.1, 0.1)).apply_translation([0.4, 0.4, 0.4])
+    free, beside = (repair_mesh(mesh) for mesh in (box, trimesh.util.concatenate([box, other])))
+    tips = [repaired.triangles[repaired.kind == CAP].reshape(-1, 3).sum(axis=1).max() for repaired in (free, beside)]
+    assert tips[0] > 1.4
+    assert tips[1] < 1.2
