@@ -33,14 +33,15 @@ def raise_caps(
     Returns:
         Vertices with new ones at the end, shape (n + more, 3) [m]; faces of the caps and their components, shapes (j, 3), (j,).
     """
+    if not taken.any():
+        return vertices, caps.faces[:0], caps.owner[:0]
     number = len(vertices)
     side = (faces * number + np.roll(faces, -1, axis=1)).ravel()
     order = np.argsort(side)
     side = side[order]
     around, points, count = None, [vertices], number
-    raised, owner = [np.zeros((0, 3), np.int64)], [np.zeros(0, np.int64)]
-    by_loop = np.split(np.flatnonzero(taken), np.flatnonzero(np.diff(caps.loop[taken])) + 1) if taken.any() else []
-    for group in by_loop:
+    raised, owner = [], []
+    for group in np.split(np.flatnonzero(taken), np.flatnonzero(np.diff(caps.loop[taken])) + 1):
         cap, loop, component = caps.faces[group], caps.loops[caps.loop[group[0]]], caps.owner[group[0]]
         sought = np.roll(loop, -1) * number + loop  # the face beyond runs the other way
         beyond = np.searchsorted(side, sought).clip(max=len(side) - 1)

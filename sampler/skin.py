@@ -252,15 +252,28 @@ def _middle_lines(triangles: np.ndarray, apart: float) -> tuple[np.ndarray, np.n
     Returns:
         Shape (m, 3) [m]; the triangle that each lies on, shape (m,).
     """
+    a, edge, rise, foot, face, rank, number = _columns(triangles, apart)
+    along = (0.5 + rank) / number
+    high = np.minimum(along / foot, (1.0 - along) / (1.0 - foot))
+    return a + along[:, None] * edge + 0.5 * high[:, None] * rise, face
+
+
+def _columns(triangles: np.ndarray, wide: float) -> tuple[np.ndarray, ...]:
+    """Triangles, shape (n, 3, 3) [m], as columns on their longest edge, each no wider than so far [m].
+
+    Returns:
+        Of each column where that edge begins, the edge, and what leads from its foot to the third corner, shape (m, 3) [m]; the
+        foot as a share of the edge, the triangle, which of its columns it is, and how many it has, shape (m,).
+    """
     a, b, c = _longest_edge_first(triangles)
     long = np.linalg.norm(b - a, axis=1)
-    foot = np.clip(np.einsum("ij,ij->i", c - a, b - a) / long**2, 1e-9, 1.0 - 1e-9)  # of the third corner on that edge
-    number = np.ceil(long / apart).astype(int)
+    foot = np.einsum("ij,ij->i", c - a, b - a) / long**2
+    foot = np.clip(foot, 1e-9, 1.0 - 1e-9)
+    number = np.ceil(long / wide).astype(int)
     face = np.repeat(np.arange(len(triangles)), number)
-    along = (0.5 + np.arange(len(face)) - np.repeat(np.cumsum(number) - number, number)) / number[face]
-    a, b, c, foot = a[face], b[face], c[face], foot[face]
-    high = np.minimum(along / foot, (1.0 - along) / (1.0 - foot))
-    return a + along[:, None] * (b - a) + 0.5 * high[:, None] * (c - a - foot[:, None] * (b - a)), face
+    rank = np.arange(len(face)) - np.repeat(np.cumsum(number) - number, number)
+    a, edge, foot = a[face], (b - a)[face], foot[face]
+    return a, edge, c[face] - a - foot[:, None] * edge, foot, face, rank, number[face]
 
 
 def halve_triangles(triangles: np.ndarray) -> np.ndarray:
@@ -276,17 +289,10 @@ def slices(triangles: np.ndarray, wide: float) -> tuple[np.ndarray, np.ndarray, 
     Returns:
         Centroids of the slices, shape (m, 3) [m]; their shares of the area, shape (m,); the triangle of each, shape (m,).
     """
-    a, b, c = _longest_edge_first(triangles)
-    edge = b - a
-    foot = np.clip(np.einsum("ij,ij->i", c - a, edge) / np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-300), 1e-9, 1.0 - 1e-9)
-    number = np.ceil(np.linalg.norm(edge, axis=1) / wide).astype(int)
-    face = np.repeat(np.arange(len(triangles)), number)
-    first = (np.arange(len(face)) - np.repeat(np.cumsum(number) - number, number)) / number[face]
-    a, edge, foot = a[face], edge[face], foot[face]
-    rise = c[face] - a - foot[:, None] * edge
+    a, edge, rise, foot, face, rank, number = _columns(triangles, wide)
     # Moments of the height above the edge, which is 1 at the foot, from the edge's begin; from the foot on it falls.
     moments = np.zeros((3, len(face)))  # of the height itself, times the way along the edge, and half of its square
-    for end, sign in ((first, -1.0), (first + 1.0 / number[face], 1.0)):
+    for end, sign in ((rank / number, -1.0), ((rank + 1) / number, 1.0)):
         u, v = np.minimum(end, foot), 1.0 - np.maximum(end, foot)
         left, right = u**2 / foot, ((1.0 - foot) ** 2 - v**2) / (1.0 - foot)
         moments[0] += sign * 0.5 * (left + right)
