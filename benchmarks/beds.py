@@ -9,8 +9,8 @@ import numpy as np
 import trimesh
 
 from sand_sim import World, read_scene, rotation
+from sand_sim.assembly.tool_model import Progress
 from sand_sim.scene.shapes import tetrahedron
-from sand_sim.tool_model import Progress
 
 RADIUS = 0.001  # [m]
 WIDTHS = {"bed_1000": 0.0142, "bed_8000": 0.04, "bed_32000": 0.08, "bed_blade_grains": 0.08}  # of the square floor [m]

@@ -9,8 +9,8 @@ import numpy as np
 from benchmarks.provenance import provenance
 from benchmarks.workloads import Workload, make_workload
 from sand_sim import UnstableError
+from sand_sim.assembly.tool_model import Progress
 from sand_sim.plan import array_sizes
-from sand_sim.tool_model import Progress
 
 SPEED_CASES = {
     "W1-1000": "1,000 settled spheres, quick to try",

@@ -22,11 +22,11 @@ from sampler.skin import Skin
 from sampler.surface import Surface
 from sand_sim import World
 from sand_sim.config_folder import find_scene
-from sand_sim.playing import commands_at, frame_times
 from sand_sim.scene.reading import load_scene
 from sand_sim.scene.types import Settle
 from sand_sim.sinks.run_log import RunLog
-from sand_sim.track import phases_of
+from sand_sim.tool_motion.playing import commands_at, frame_times
+from sand_sim.tool_motion.track import phases_of
 
 PLACES = 4000
 STEPS, ROUNDS = 200, 25

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.beds import WIDTHS, bed_scene, blade_tool, find_bed
 from sand_sim import ToolPose, World, read_scene
-from sand_sim.tool_model import Progress
+from sand_sim.assembly.tool_model import Progress
 
 BLADE_SPEED = 0.1  # [m/s]
 

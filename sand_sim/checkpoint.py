@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sand_sim.scene_identity import find_difference
+from sand_sim.assembly.scene_identity import find_difference
 from sand_sim.world import World
 
 _MAGIC = b"sand_sim checkpoint "

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sand_sim.border import CommandError, ToolPose, ToolVelocity
-from sand_sim.commands import Command
+from sand_sim.tool_motion.commands import Command
 from sand_sim.world import World
 
 _MOST_WAITING = 100_000

@@ -6,8 +6,8 @@ from dataclasses import fields
 import numpy as np
 
 from sand_sim.border import CommandError, ToolPose, ToolVelocity
-from sand_sim.commands import Command
 from sand_sim.courses import Course, Courses
+from sand_sim.tool_motion.commands import Command
 from sand_sim.world import World
 
 _KINDS = {"pose": ToolPose, "velocity": ToolVelocity}

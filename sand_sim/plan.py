@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 import warp as wp
 
-from sand_sim.assemble import Assembly
+from sand_sim.assembly.assemble import Assembly
 from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.device import CpuDevice, CudaDevice, open_device
 from sand_sim.engine.explicit_dem import ExplicitDem

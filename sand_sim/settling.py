@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from sand_sim.assemble import Assembly, fall_height
-from sand_sim.clearance import find_obstacles
-from sand_sim.contact_reading import observe_grain_contacts
+from sand_sim.assembly.assemble import Assembly, fall_height
+from sand_sim.assembly.tool_model import Progress
+from sand_sim.changes.clearance import find_obstacles
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.engine.reviving import revive
-from sand_sim.observing import observe_grains, observe_spheres, outer_force
+from sand_sim.readout.contact_reading import observe_grain_contacts
+from sand_sim.readout.observing import observe_grains, observe_spheres, outer_force
 from sand_sim.scene.types import SceneError
-from sand_sim.tool_model import Progress
 
 _CHUNKS = 50
 _BORNE = 0.02  # share of the weight by which what bears a bed at rest may differ from it

@@ -22,10 +22,10 @@ import numpy as np
 from sand_sim.border import CommandError, Observation
 from sand_sim.checkpoint import Checkpoint, CheckpointError, load_checkpoint, take_checkpoint, write_checkpoint
 from sand_sim.checkpoints import CheckpointFolder
-from sand_sim.commands import Command
 from sand_sim.courses import USUAL, Courses, StampRules
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.pending import pack_told, unpack_told
+from sand_sim.tool_motion.commands import Command
 from sand_sim.world import World
 
 PACINGS = ("realtime", "fast", "lockstep")

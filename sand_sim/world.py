@@ -4,18 +4,19 @@ from dataclasses import astuple, replace
 
 import numpy as np
 
-from sand_sim.assemble import Assembly, assemble
-from sand_sim.beforehand import find_coarseness, find_fine_surfaces, find_overlap
+from sand_sim.assembly.assemble import Assembly, assemble
+from sand_sim.assembly.scene_identity import describe_scene, digest
+from sand_sim.assembly.tool_model import Progress, ToolModel
 from sand_sim.border import CommandError, GrainContacts, Health, Observation, ToolContacts, ToolPose, ToolVelocity
-from sand_sim.carrying_over import describe_changes, expect_layout, fit
-from sand_sim.changing import Changeable
-from sand_sim.commands import Command, check_command, check_steps, pose_after
-from sand_sim.contact_reading import observe_grain_contacts, observe_tool_contacts
+from sand_sim.changes.carrying_over import describe_changes, expect_layout, fit
+from sand_sim.changes.changing import Changeable
 from sand_sim.engine.explicit_dem import ExplicitDem, UnstableError
 from sand_sim.engine.state_check import check_layout, check_numbers
 from sand_sim.engine.tools import ToolTrack
 from sand_sim.integrator import VERLET
-from sand_sim.observing import (
+from sand_sim.readout.beforehand import find_coarseness, find_fine_surfaces, find_overlap
+from sand_sim.readout.contact_reading import observe_grain_contacts, observe_tool_contacts
+from sand_sim.readout.observing import (
     StartEnergy,
     observe_bodies,
     observe_grains,
@@ -25,13 +26,12 @@ from sand_sim.observing import (
     observe_walls,
     start_energy,
 )
+from sand_sim.readout.sweeping import SweptGround
+from sand_sim.readout.trust import BLOWN_UP, GAINED, gained_share
 from sand_sim.scene.types import Scene
-from sand_sim.scene_identity import describe_scene, digest
 from sand_sim.settling import settle
-from sand_sim.sweeping import SweptGround
-from sand_sim.tool_model import Progress, ToolModel
-from sand_sim.track import SPEED_TOLERANCE, Track, travel
-from sand_sim.trust import BLOWN_UP, GAINED, gained_share
+from sand_sim.tool_motion.commands import Command, check_command, check_steps, pose_after
+from sand_sim.tool_motion.track import SPEED_TOLERANCE, Track, travel
 
 _FEWEST_BETWEEN = 100  # steps between two states that are kept, so that keeping them stays below 3 % of the time
 

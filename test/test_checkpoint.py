@@ -22,7 +22,7 @@ from sand_sim.checkpoint import (
     write_checkpoint,
 )
 from sand_sim.checkpoints import CheckpointFolder
-from sand_sim.playing import commands_at, frame_times
+from sand_sim.tool_motion.playing import commands_at, frame_times
 
 BEFORE, AFTER = 0.2, 0.3  # [s] the plate is in the sand from 0.25 s on
 

@@ -12,9 +12,9 @@ import trimesh
 from scenes import floor, write_small_scene
 
 from sand_sim import SceneError, UnstableError, World, load_scene
-from sand_sim.playing import commands_at, frame_times
 from sand_sim.simulation import Simulation
-from sand_sim.track import pose_on_trajectory
+from sand_sim.tool_motion.playing import commands_at, frame_times
+from sand_sim.tool_motion.track import pose_on_trajectory
 
 FORCED = {"time_step": 9.0e-4, "force_time_step": True}
 LOW_FLOOR = [{"name": "floor", "type": "plane", "material": "steel", "point": [0, 0, -0.02], "normal": [0, 0, 1]}]

@@ -10,7 +10,7 @@ from kernel_source import source
 from scenes import floor, write_small_scene
 from timing import quickest
 
-from sand_sim.assemble import assemble
+from sand_sim.assembly.assemble import assemble
 from sand_sim.cli.main import main
 from sand_sim.engine.pair_tiles import build_pair_tiles
 from sand_sim.interruption import InterruptedByUserError

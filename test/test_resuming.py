@@ -13,9 +13,9 @@ from sand_sim.checkpoint import CheckpointError, read_checkpoint
 from sand_sim.checkpoints import CheckpointFolder
 from sand_sim.courses import Courses, StampRules
 from sand_sim.pending import pack_told, unpack_told
-from sand_sim.playing import commands_at, frame_times
 from sand_sim.simulation import Simulation
 from sand_sim.sinks.run_log import RunLog
+from sand_sim.tool_motion.playing import commands_at, frame_times
 
 MIDDLE = 0.25
 POSE = {"kind": "pose", "tool": "plate", "position": [0, 0, 0.1], "orientation": [0, 0, 0, 1], "time": 1.0}

@@ -11,8 +11,8 @@ import pytest
 from scenes import write_small_scene
 
 from sand_sim import ToolPose, World, load_scene
-from sand_sim.playing import commands_at, frame_times
 from sand_sim.simulation import Simulation
+from sand_sim.tool_motion.playing import commands_at, frame_times
 
 NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
 START = np.array([0.015, 0.015, 0.06])

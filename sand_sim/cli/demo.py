@@ -10,9 +10,9 @@ from pathlib import Path
 from sand_sim.cli.writing import make_folder, place
 from sand_sim.config_folder import find_scene
 from sand_sim.interruption import Interruption
-from sand_sim.playing import driven_tools
 from sand_sim.report import summary_text
 from sand_sim.scene.reading import load_scene
+from sand_sim.tool_motion.playing import driven_tools
 
 _PATIENCE = 20.0  # [s] for a process to end by itself after it was asked to
 

@@ -4,8 +4,8 @@ import argparse
 import sys
 
 from sand_sim.cli.console import Console
-from sand_sim.cli.output import UNREAD, perhaps_unread
 from sand_sim.interruption import InterruptedByUserError, Interruption
+from sand_sim.output import UNREAD, perhaps_unread
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -4,7 +4,7 @@ import argparse
 import json
 from dataclasses import asdict
 
-from sand_sim.assemble import assemble
+from sand_sim.assembly.assemble import assemble
 from sand_sim.cli import changes
 from sand_sim.cli.console import Console
 from sand_sim.config_folder import find_scene

@@ -16,10 +16,10 @@ from sand_sim.cli.writing import make_folder, place
 from sand_sim.config_folder import find_scene
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.interruption import Interruption
-from sand_sim.playing import commands_at, frame_times
 from sand_sim.report import progress_line, summary_text
 from sand_sim.sinks.recorder import Recorder, RecordingError, require_rerun
 from sand_sim.sinks.run_log import RunLog
+from sand_sim.tool_motion.playing import commands_at, frame_times
 from sand_sim.world import World
 
 

@@ -12,11 +12,11 @@ from sensor_msgs.msg import Image, PointCloud2
 from msg_adapters.nav_msgs import grid_to_metadata
 from msg_adapters.sensor_msgs import grains_to_cloud, heights_to_image
 from sand_sim.border import Observation
-from sand_sim.cloud_selection import select_box, select_every, select_voxels
-from sand_sim.height_map import bed_grid, make_height_map
 from sand_sim.node.connections import Connections
 from sand_sim.node.parameters import Parameters
 from sand_sim.node.rate import Rate
+from sand_sim.readout.cloud_selection import select_box, select_every, select_voxels
+from sand_sim.readout.height_map import bed_grid, make_height_map
 from sand_sim.world import World
 
 _MOST_WAITING = 5  # as many as are kept for a reader

@@ -9,7 +9,7 @@ import numpy as np
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 
-from sand_sim.mesh_roots import allowed_mesh, mesh_roots
+from sand_sim.assembly.mesh_roots import allowed_mesh, mesh_roots
 from sand_sim.node.arguments import ArgumentError, read_arguments
 from sand_sim.node.connections import Connections
 from sand_sim.node.services import Services

@@ -16,9 +16,9 @@ from msg_adapters.simulation_interfaces import (
 )
 from sand_sim import rotation
 from sand_sim.border import BodyReport, CommandError, Observation, ToolPose, ToolReport
-from sand_sim.frames import FrameTree
-from sand_sim.name_pattern import NamePattern, PatternError
 from sand_sim.node.connections import Connections
+from sand_sim.node.frames import FrameTree
+from sand_sim.node.name_pattern import NamePattern, PatternError
 from sand_sim.node.services import Services
 from sand_sim.simulation import Simulation
 

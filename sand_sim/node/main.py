@@ -2,8 +2,8 @@
 
 import sys
 
-from sand_sim.cli.output import perhaps_unread
 from sand_sim.interruption import InterruptedByUserError, Interruption
+from sand_sim.output import perhaps_unread
 
 _USAGE = (
     "usage: sand_sim_node --ros-args -p scene:=FILE [-p NAME:=VALUE ...] [--params-file FILE] [-r __node:=NAME] ...; "

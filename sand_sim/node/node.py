@@ -19,11 +19,11 @@ from sand_sim.checkpoints import CheckpointFolder
 from sand_sim.config_folder import find_scene
 from sand_sim.courses import StampRules
 from sand_sim.engine.explicit_dem import UnstableError
-from sand_sim.frames import FrameTree
 from sand_sim.node.bed_outputs import BedOutputs, coarse_points
 from sand_sim.node.change_services import ChangeServices
 from sand_sim.node.connections import Connections
 from sand_sim.node.diagnosis import Diagnosis
+from sand_sim.node.frames import FrameTree
 from sand_sim.node.graph_watch import GraphWatch
 from sand_sim.node.managed_node import ManagedNode
 from sand_sim.node.parameters import Parameters, tool_declarations

@@ -15,8 +15,8 @@ from msg_adapters.builtin_interfaces import stamp_to_time
 from msg_adapters.geometry_msgs import command_to_pose
 from sand_sim.interruption import Interruption
 from sand_sim.node.security import demand_security
-from sand_sim.playing import commands_at, driven_tools, frame_times
 from sand_sim.scene.types import Scene, SceneError
+from sand_sim.tool_motion.playing import commands_at, driven_tools, frame_times
 
 _AHEAD = 0.2  # [s] of simulated time by which poses are sent before they are due
 _PATIENCE = 3.0  # [s] of waiting after which it is told what for

@@ -11,9 +11,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.validate_topic_name import validate_topic_name
 from std_msgs.msg import String
 
+from sand_sim.assembly.urdf import Robot, parse_robot
 from sand_sim.scene.types import SceneError
 from sand_sim.showing import shown
-from sand_sim.urdf import Robot, parse_robot
 
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE)
 _PERIOD = 0.05  # [s] between two looks at what else is wanted

@@ -8,6 +8,7 @@ import trimesh
 from visualization_msgs.msg import Marker, MarkerArray
 
 from msg_adapters.visualization_msgs import lines_to_marker, triangles_to_marker
+from sand_sim.assembly.tool_model import ToolModel
 from sand_sim.border import Observation
 from sand_sim.node.connections import Connections
 from sand_sim.node.parameters import Parameters
@@ -15,7 +16,6 @@ from sand_sim.node.rate import Rate
 from sand_sim.scene.types import Boundary
 from sand_sim.scene.walls import Wall, walls_of
 from sand_sim.sinks.wall_mesh import in_outline, plane_outline, wall_mesh
-from sand_sim.tool_model import ToolModel
 from sand_sim.world import World
 
 _TOOL, _WALL, _GROUND = (0.55, 0.59, 0.65, 1.0), (0.59, 0.59, 0.63, 0.35), (0.59, 0.53, 0.43, 1.0)

@@ -11,10 +11,10 @@ from rclpy.lifecycle import LifecycleNode
 
 from msg_adapters.simulation_interfaces import action, msg, names_to_features, srv
 from sand_sim.border import Observation
-from sand_sim.frames import FrameTree
 from sand_sim.node.connections import Connections
 from sand_sim.node.entity_services import FEATURES as ENTITY_FEATURES
 from sand_sim.node.entity_services import EntityServices, failed, succeeded, unsupported, wrong_state
+from sand_sim.node.frames import FrameTree
 from sand_sim.node.services import Services
 from sand_sim.simulation import Simulation
 

@@ -10,8 +10,8 @@ from msg_adapters import tf2_msgs
 from msg_adapters.geometry_msgs import pose_to_command, twist_to_command
 from sand_sim import rotation
 from sand_sim.border import CommandError, Frame, Observation, ToolPose
-from sand_sim.frames import FrameTree
 from sand_sim.node.connections import Connections
+from sand_sim.node.frames import FrameTree
 from sand_sim.node.parameters import Parameters, frame_declarations
 from sand_sim.scene.reading_poses import in_degrees
 from sand_sim.simulation import Simulation

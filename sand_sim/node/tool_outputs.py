@@ -11,8 +11,8 @@ from msg_adapters.sensor_msgs import columns_to_cloud
 from msg_adapters.visualization_msgs import contacts_to_markers
 from sand_sim import rotation
 from sand_sim.border import Frame, Observation, ToolContacts, ToolReport
-from sand_sim.low_pass import LowPass
 from sand_sim.node.connections import Connections
+from sand_sim.node.low_pass import LowPass
 from sand_sim.node.parameters import Parameters
 from sand_sim.node.rate import Rate
 from sand_sim.world import World

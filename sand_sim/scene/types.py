@@ -246,7 +246,7 @@ class Scene:
     frame_rate: float = 50.0  # [1/s] observations per simulated second
     folder: Path = field(default_factory=Path.cwd)  # relative paths start here
     robot_description: str = ""  # content of a URDF, of which tools are links
-    mesh_roots: tuple[str, ...] = ("",)  # folders for meshes of robot descriptions, see ``sand_sim.mesh_roots``
+    mesh_roots: tuple[str, ...] = ("",)  # folders for meshes of robot descriptions, see ``sand_sim.assembly.mesh_roots``
 
     def material_index(self, name: str) -> int:
         """Index of a material in ``materials``."""

@@ -6,12 +6,12 @@ import numpy as np
 import rerun as rr
 import trimesh
 
+from sand_sim.assembly.tool_model import ToolModel
 from sand_sim.border import Observation
 from sand_sim.scene.walls import Wall, walls_of
 from sand_sim.sinks.blueprint import make_blueprint, series_styles
 from sand_sim.sinks.colours import colour_by_speed, fastest_shown
 from sand_sim.sinks.wall_mesh import in_outline, plane_outline, wall_mesh
-from sand_sim.tool_model import ToolModel
 from sand_sim.world import World
 
 _TIMELINE = "sim_time"

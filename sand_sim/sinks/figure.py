@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from sand_sim import rotation
+from sand_sim.assembly.tool_model import ToolModel
 from sand_sim.sinks.colours import colour_by_speed, fastest_shown
 from sand_sim.sinks.run_log import RunLog, View
-from sand_sim.tool_model import ToolModel
 
 _VIEWS = 3
 _TILT = np.radians(14.0)  # of the view from the horizontal

@@ -9,9 +9,9 @@ from uuid import uuid4
 import numpy as np
 
 from sand_sim.border import Observation, ToolReport
+from sand_sim.readout.trust import kind_of
 from sand_sim.scene.types import Scene, Tool
-from sand_sim.track import phases_at, phases_of
-from sand_sim.trust import kind_of
+from sand_sim.tool_motion.track import phases_at, phases_of
 
 _STILL = 1e-4  # [m/s] horizontal speed below which a tool has no draft
 # What each row holds of the world's health, of every tool, by the attribute of its report, and of every plunger.

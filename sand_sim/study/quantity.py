@@ -7,11 +7,11 @@ from typing import Protocol
 import numpy as np
 
 from sand_sim.border import Observation
-from sand_sim.playing import commands_at, frame_times
+from sand_sim.readout.trust import kind_of
 from sand_sim.scene.types import Scene, SceneError
 from sand_sim.study.impact import Impact
 from sand_sim.study.sample import Sample
-from sand_sim.trust import kind_of
+from sand_sim.tool_motion.playing import commands_at, frame_times
 from sand_sim.world import World
 
 SMOOTHED = 0.1  # of the duration: standard width of the moving mean over histories

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sand_sim.assemble import assemble
+from sand_sim.assembly.assemble import assemble
 from sand_sim.scene.types import Scene, SceneError, unit
 
 _UNSCALED = ("weights",)  # numbers inside a scaled entry that are no lengths

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from sand_sim.border import CommandError
 from sand_sim.engine.explicit_dem import UnstableError
+from sand_sim.readout.trust import GAINED, gained_share
 from sand_sim.scene.types import SceneError
 from sand_sim.study.bench import Bench
-from sand_sim.trust import GAINED, gained_share
 
 RIGHT, FLAGGED, REFUSED, WRONG = "right", "flagged", "refused", "silently wrong"
 

@@ -30,7 +30,7 @@ def test_its_measures_make_sense(tmp_path, monkeypatch):
     """On the stand-in, with a bed of a few grains, two by two."""
     lattice = np.stack(np.meshgrid(range(5), range(5), range(4), indexing="ij"), -1).reshape(-1, 3)
     np.savez(tmp_path / "tile_8000.npz", position=0.001 + 0.00199 * lattice, radius=np.full(len(lattice), 0.001))
-    monkeypatch.setattr("sand_sim.assemble.open_device", lambda name, threads: ManyThreads(1000, 64))
+    monkeypatch.setattr("sand_sim.assembly.assemble.open_device", lambda name, threads: ManyThreads(1000, 64))
     monkeypatch.setattr(gpu, "CASES", {"small": (2, 2)})
     monkeypatch.setitem(WIDTHS, "tile_8000", 0.01)
     monkeypatch.setattr(gpu, "COPIED", 2**22)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sand_sim.playing import commands_at
+from sand_sim.tool_motion.playing import commands_at
 
 GRAVITY, TURNS = 9.81, 30.0  # [m/s^2], [rad/s] around the cylinder
 

@@ -32,7 +32,7 @@ def with_device(monkeypatch):
 
     def made(device, make):
         with monkeypatch.context() as patch:
-            patch.setattr("sand_sim.assemble.open_device", lambda name, threads: device)
+            patch.setattr("sand_sim.assembly.assemble.open_device", lambda name, threads: device)
             return make()
 
     return made

@@ -22,7 +22,7 @@ def device(request, monkeypatch):
     if request.param == "stand-in":
         stand_in = ManyThreads(threads=500, shares=64)
         choose = lambda name, threads: stand_in if name == "cuda" else open_device(name, threads)  # noqa: E731
-        monkeypatch.setattr("sand_sim.assemble.open_device", choose)
+        monkeypatch.setattr("sand_sim.assembly.assemble.open_device", choose)
     return "cuda"
 
 

@@ -9,7 +9,7 @@ from cuda_compiling import ARCHITECTURES, compile_all
 from many_threads import ManyThreads
 
 from sand_sim import load_scene
-from sand_sim.assemble import assemble
+from sand_sim.assembly.assemble import assemble
 from sand_sim.contact.model import SLOTS, ContactModel
 from sand_sim.engine import energy, motion, neighbours, pair_forces, plungers, recipe, surface_contacts, tool_contacts
 from sand_sim.engine.body_motion import build_move_bodies, build_see_bodies
@@ -28,7 +28,7 @@ def launched(name, contact="rough"):
     scene = load_scene(CONFIG / f"{name}.yaml")
     scene = replace(scene, tools=tuple(replace(tool, contact=contact) for tool in scene.tools))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sand_sim.assemble.open_device", lambda name, threads: ManyThreads())
+        patch.setattr("sand_sim.assembly.assemble.open_device", lambda name, threads: ManyThreads())
         solver = assemble(scene).solver
     return list_kernels(solver.arrays, solver.stages, solver.device)
 

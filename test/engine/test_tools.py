@@ -8,7 +8,7 @@ from scenes import SceneMaker, floor, record, write_small_scene
 from spread import distances
 
 from sand_sim import CommandError, SceneError, ToolPose, World, read_scene
-from sand_sim.playing import commands_at
+from sand_sim.tool_motion.playing import commands_at
 
 GRAIN = {"density": 2500.0, "young": 1e7, "poisson": 0.25}
 NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])

@@ -9,10 +9,10 @@ from shapes import robot_mesh, wavy_ball
 from sampler import read_mesh, sample_file
 from sampler.closest import closest_on_triangles
 from sampler.surface import Surface
+from sand_sim.assembly.true_surface import outward_triangles
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.smooth_tools import SmoothTools
 from sand_sim.engine.triangle_tree import TriangleTree, nearest_on_tree
-from sand_sim.true_surface import outward_triangles
 
 
 @kernel

@@ -20,7 +20,7 @@ from msg_adapters.builtin_interfaces import stamp_to_time
 from msg_adapters.geometry_msgs import command_to_pose, wrench_to_arrays
 from msg_adapters.sensor_msgs import cloud_to_points
 from sand_sim import load_scene
-from sand_sim.playing import commands_at, frame_times
+from sand_sim.tool_motion.playing import commands_at, frame_times
 
 
 def test_a_recording_that_cannot_be_written_is_told_on_diagnostics(client, start_node, tmp_path):

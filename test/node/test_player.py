@@ -15,7 +15,7 @@ from node_client import PATIENCE
 from processes import kill
 from scenes import write_small_scene
 
-from sand_sim.playing import commands_at
+from sand_sim.tool_motion.playing import commands_at
 
 
 @pytest.fixture

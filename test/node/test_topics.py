@@ -26,8 +26,8 @@ from msg_adapters.geometry_msgs import command_to_twist, frame_to_transform, wre
 from msg_adapters.sensor_msgs import cloud_to_points, image_to_heights
 from sand_sim import rotation
 from sand_sim.border import Frame, ToolVelocity
-from sand_sim.low_pass import LowPass
 from sand_sim.node import bed_outputs
+from sand_sim.node.low_pass import LowPass
 from sand_sim.node.tool_inputs import ToolInputs, fixed_frames
 
 TOOL = "/sand_sim/tools/plate"

@@ -13,7 +13,7 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.builtin_interfaces import stamp_to_time
 from msg_adapters.geometry_msgs import command_to_pose
 from sand_sim import ToolPose
-from sand_sim.playing import commands_at, frame_times
+from sand_sim.tool_motion.playing import commands_at, frame_times
 
 START = np.array([0.015, 0.015, 0.06])
 NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])

@@ -1,0 +1,110 @@
+"""The part of a world that changes what is in it while it runs: grains come and go, tools get other bodies."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from sand_sim.assembly.assemble import Assembly
+from sand_sim.border import Health
+from sand_sim.changes.carrying_over import carry_over, rebuild
+from sand_sim.changes.exchange import check_room, find_grains, read_grains
+from sand_sim.changes.tool_exchange import check_tool, read_tool
+from sand_sim.grain_table import GrainTable
+from sand_sim.readout.beforehand import find_coarseness, find_fine_surfaces
+from sand_sim.readout.observing import balance_rounding, observe_grains, observe_spheres
+
+
+class Changeable:
+    """Methods of ``World``, whose attributes they use."""
+
+    def add_grains(self, position, radius, material: str | None = None, velocity=0.0) -> np.ndarray:
+        """Put spheres into the running world; all else goes on as it was, and ``reset`` takes them away again.
+
+        Args:
+            position: shape (n, 3) [m].
+            radius: one number or shape (n,) [m].
+            material: name; may be left out where the scene has grains of one material only.
+            velocity: one number, shape (3,) or (n, 3) [m/s].
+
+        Returns:
+            Their identities, shape (n,), which follow the largest one ever used.
+
+        Raises:
+            CommandError: if they make no sense or overlap anything; the message says how many and where, nothing is changed.
+        """
+        self._health()
+        rows = read_grains(self.assembly, position, radius, material, velocity)
+        check_room(self.assembly, observe_spheres(self.assembly), self._poses, rows)
+        table = self.assembly.table
+        if len(rows):
+            longer = rebuild(self.assembly, GrainTable.join([table, rows]), self.tools)
+            carry_over(self.assembly, longer)
+            self._go_on_with(longer)
+        return np.arange(table.grains, table.grains + len(rows))
+
+    def remove_grains(self, identity=None, box=None) -> np.ndarray:
+        """Take grains out of the running world; ``reset`` brings them back.
+
+        Args:
+            identity: of the grains, shape (n,).
+            box: instead of it, lowest and highest corner of a box, shape (3,) each [m]; grains whose centres are inside go, the
+                scene's named bodies stay.
+
+        Returns:
+            Identities of the grains that are gone.
+
+        Raises:
+            CommandError: if there is no such grain; nothing is changed then.
+        """
+        self._health()
+        cloud = observe_grains(self.assembly)
+        gone = find_grains(self.assembly, cloud, identity, box)
+        self._solver.remove(np.flatnonzero(np.isin(self.assembly.grain_of_sphere, gone)))
+        self._go_on_with(self.assembly)
+        return gone
+
+    def set_tool_mesh(self, tool: str, mesh: str, scale: float = 1.0) -> None:
+        """Give a tool another body at the pose it has; what it does and has done stays, ``reset`` brings the first one back.
+
+        If it reaches farther than any tool before, positions are rounded anew, to a coarser lattice (see ``lattice.py``).
+
+        Args:
+            tool: name.
+            mesh: file, or address as in a scene.
+            scale: [m per mesh unit].
+
+        Raises:
+            CommandError: if the mesh cannot be used, or cuts deeper into grains by a tenth of a radius; nothing is changed then.
+        """
+        index = self._index_of(tool)
+        self._health()
+        model = read_tool(self.assembly, self.tools[index].tool, mesh, scale)
+        tools = [*self.tools[:index], model, *self.tools[index + 1 :]]
+        check_tool(self.assembly, tools, index, self._poses[index], observe_spheres(self.assembly))
+        self._sweep()
+        self._models[index, model.tool.mesh, model.tool.scale] = model
+        other = rebuild(self.assembly, self.assembly.table, tools)
+        carry_over(self.assembly, other, replaced=index)
+        self._go_on_with(other)
+
+    def _go_on_with(self, assembly: Assembly) -> None:
+        """Go on with other grains or tools, after a moment in which no time has passed.
+
+        So all energy that is there now and was not before has come with them, and what is missing has gone with them.
+        """
+        was, start = self._health(), replace(self._start)
+        self.assembly = assembly
+        self._look_anew()
+        now = self._health()
+        start.total += was.dissipated - now.dissipated
+        start.height += now.potential - was.potential
+        start.grains += was.retired - now.retired
+        start.rounding = max(start.rounding, balance_rounding(assembly))
+        self._start, self._measured = start, None
+        self._good_health, self._good, self._kept_steps = self._health(), self.save(), self._solver.steps_done
+
+    def _look_anew(self) -> None:
+        """Forget what has been found out about other grains or tools."""
+        self._swept.set_tools(self.tools)
+        self._beforehand = self._overlap + find_fine_surfaces(self.assembly) + find_coarseness(self.assembly)
+        self._measured: tuple[int, Health] | None = None

@@ -1,0 +1,1 @@
+"""Where tools go: single commands, the way between two of them, trajectories of scenes."""
