@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from sampler import SignedDistance, make_field, read_mesh
-from sampler.skin import Skin
+from sampler.particles.skin import Skin
 
 POINTS, ROUNDS = 50_000, 5
 BAND = 0.02  # of the diagonal

@@ -16,11 +16,11 @@ import numpy as np
 import trimesh
 
 from sampler import MeshError, read_mesh, repair_mesh, sample_body
-from sampler.lattice import lattice_spacing
+from sampler.geometry.surface import Surface
 from sampler.measuring import measure_evenness
-from sampler.repair import SHEET
-from sampler.skin import Skin, free_triangles
-from sampler.surface import Surface
+from sampler.mending.repair import SHEET
+from sampler.particles.lattice import lattice_spacing
+from sampler.particles.skin import Skin, free_triangles
 
 
 def ours(mesh, count):

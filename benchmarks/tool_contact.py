@@ -18,8 +18,8 @@ import numpy as np
 
 from benchmarks.provenance import provenance
 from sampler import ParticleBody, sample_file
-from sampler.skin import Skin
-from sampler.surface import Surface
+from sampler.geometry.surface import Surface
+from sampler.particles.skin import Skin
 from sand_sim import World
 from sand_sim.config_folder import find_scene
 from sand_sim.scene.reading import load_scene

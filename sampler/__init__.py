@@ -9,9 +9,9 @@ if TYPE_CHECKING:
     from sampler.distance import SignedDistance
     from sampler.errors import MeshError
     from sampler.field import DistanceField, make_field
-    from sampler.location import locate_mesh, package_prefixes, package_share, split_address
-    from sampler.reading import read_mesh
-    from sampler.repair import repair_mesh
+    from sampler.files.location import locate_mesh, package_prefixes, package_share, split_address
+    from sampler.files.reading import read_mesh
+    from sampler.mending.repair import repair_mesh
     from sampler.sampling import sample_body
     from sampler.storage import load_body, save_body
 
@@ -40,17 +40,17 @@ _HOMES = {
     "ParticleBody": "body",
     "SignedDistance": "distance",
     "load_body": "storage",
-    "locate_mesh": "location",
+    "locate_mesh": "files.location",
     "make_field": "field",
-    "package_prefixes": "location",
-    "package_share": "location",
-    "read_mesh": "reading",
-    "repair_mesh": "repair",
+    "package_prefixes": "files.location",
+    "package_share": "files.location",
+    "read_mesh": "files.reading",
+    "repair_mesh": "mending.repair",
     "sample_body": "sampling",
     "sample_file": "cache",
     "sample_mesh": "cache",
     "save_body": "storage",
-    "split_address": "location",
+    "split_address": "files.location",
 }
 
 

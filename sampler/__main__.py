@@ -30,10 +30,10 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     from sampler.cache import sample_file
     from sampler.distance import SignedDistance
-    from sampler.location import locate_mesh
+    from sampler.files.location import locate_mesh
+    from sampler.files.reading import read_mesh
     from sampler.options import check_weight
     from sampler.quiet import start_warp
-    from sampler.reading import read_mesh
     from sampler.report import report_table
     from sampler.storage import save_body
 

@@ -13,7 +13,7 @@ import trimesh
 
 from sampler.body import ParticleBody
 from sampler.errors import MeshError
-from sampler.reading import read_mesh
+from sampler.files.reading import read_mesh
 from sampler.sampling import sample_body
 from sampler.storage import load_body, save_body
 
@@ -98,7 +98,7 @@ def _key(content: bytes, options: dict) -> str:
 @cache
 def _code() -> bytes:
     """The sampler's own source, as it is when first asked for."""
-    return b"".join(source.read_bytes() for source in sorted(Path(__file__).parent.glob("*.py")))
+    return b"".join(source.read_bytes() for source in sorted(Path(__file__).parent.rglob("*.py")))
 
 
 def _sweep(folder: Path) -> None:

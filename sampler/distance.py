@@ -5,10 +5,10 @@ from functools import cached_property
 import numpy as np
 import trimesh
 
-from sampler.pseudonormals import Pseudonormals
-from sampler.repair import RepairedMesh, repair_mesh
+from sampler.geometry.pseudonormals import Pseudonormals
+from sampler.geometry.surface import Surface
+from sampler.mending.repair import RepairedMesh, repair_mesh
 from sampler.sheets import closed_triangles
-from sampler.surface import Surface
 
 _NEAR = 1e-5  # of the diagonal; where single precision may blur the winding number the nearest face decides
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from sampler.body import Evenness
 from sampler.errors import MeshError
-from sampler.surface import Surface
+from sampler.geometry.surface import Surface
 
 MOST = 2_000_000  # particles, more are not meant
 _LONG = 200_000  # particles take so long that it is told before

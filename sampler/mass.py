@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sampler.surface import Surface
+from sampler.geometry.surface import Surface
 
 _COARSE, _ACROSS = 8, 64  # cells across the box in which places inside are counted, the largest and the smallest ones
 _SURE = 0.4  # by how much winding numbers differ from a half where all of a cell is inside or outside

@@ -3,9 +3,9 @@
 import numpy as np
 
 from sampler.body import Evenness
-from sampler.gaps import CLOSE_STEPS, FAR, Gaps
-from sampler.lattice import lattice_spacing
-from sampler.skin import Skin
+from sampler.particles.gaps import CLOSE_STEPS, FAR, Gaps
+from sampler.particles.lattice import lattice_spacing
+from sampler.particles.skin import Skin
 
 _MEASURED = 50  # places per particle, over the area, and as many over the edges
 _MANY = 10_000  # of so many particles, only places that may be among the worst are kept in mind

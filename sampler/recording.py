@@ -8,7 +8,7 @@ import trimesh
 from sampler.body import ParticleBody
 from sampler.distance import SignedDistance
 from sampler.errors import MeshError
-from sampler.surface import Surface
+from sampler.geometry.surface import Surface
 
 _EVERY = 3  # moves of the particles between two pictures
 _SLICE = 200  # nodes along the longest edge of a slice

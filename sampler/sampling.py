@@ -8,19 +8,19 @@ import trimesh
 
 from sampler.body import Evenness, ParticleBody
 from sampler.errors import MeshError
-from sampler.inset import Inside, inset_triangles
-from sampler.lattice import lattice_spacing, particle_count
+from sampler.geometry.surface import Surface
 from sampler.limits import MOST, broken_limits, check_scale, check_thickness, too_many
 from sampler.mass import count_inside, integrate, is_physical, joined, openness
 from sampler.measuring import measure_evenness
+from sampler.mending.repair import SHEET, RepairedMesh, repair_mesh
 from sampler.options import check_options
-from sampler.repair import SHEET, RepairedMesh, repair_mesh
-from sampler.rims import beyond_edges, beyond_layers
+from sampler.particles.inset import Inside, inset_triangles
+from sampler.particles.lattice import lattice_spacing, particle_count
+from sampler.particles.rims import beyond_edges, beyond_layers
+from sampler.particles.skin import Skin, coinciding_layers, free_triangles, touchable_parts, winding_before
+from sampler.particles.spreading import Observer, spread_particles
+from sampler.particles.strips import with_rows
 from sampler.sheets import closed_triangles, plates_outside, thick_plates
-from sampler.skin import Skin, coinciding_layers, free_triangles, touchable_parts, winding_before
-from sampler.spreading import Observer, spread_particles
-from sampler.strips import with_rows
-from sampler.surface import Surface
 
 SPACING = 1.5  # default distance between neighbours in particle radii; below 2 so that particles overlap into a closed skin
 _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest grain

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from sampler.caps import close_holes
+from sampler.geometry.surface import Surface
+from sampler.geometry.topology import edges_of, halves_around, link_items
 from sampler.mass import inertia_of, joined
-from sampler.repair import SHEET, RepairedMesh
-from sampler.skin import Skin
-from sampler.surface import Surface
-from sampler.topology import edges_of, halves_around, link_items
+from sampler.mending.caps import close_holes
+from sampler.mending.repair import SHEET, RepairedMesh
+from sampler.particles.skin import Skin
 
 _PAIRS = 10_000  # of places in plates, of which is asked whether they lie in a solid
 

@@ -45,6 +45,12 @@ BELOW["changes"] = BELOW["readout"] | {"readout"}
 BELOW["sinks"] = BELOW["changes"] | {"world"}
 BELOW["study"] = BELOW["changes"] | {"world"}
 WITHOUT_SAMPLER = {"contact", "engine", "scene"}
+BELOW_IN_SAMPLER = {
+    "geometry": {"launching"},
+    "files": {"geometry", "errors", "options"},
+    "mending": {"geometry", "errors", "files"},
+    "particles": {"geometry", "launching"},
+}
 
 
 def imports(path):
@@ -54,7 +60,7 @@ def imports(path):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names if node.module == "sand_sim")
+            yield from (f"{node.module}.{alias.name}" for alias in node.names if node.module in PACKAGES)
 
 
 def test_lint():
@@ -74,6 +80,10 @@ def test_imports_point_one_way(path):
     names = {name.split(".")[0] for name in imports(path)}
     if package == "sampler":
         assert not names & (ROS | {"sand_sim", "msg_adapters"})
+        part = path.relative_to(ROOT / "sampler").parts[0]
+        if part in BELOW_IN_SAMPLER:
+            used = {name.split(".")[1] for name in imports(path) if name.startswith("sampler.")}
+            assert used <= BELOW_IN_SAMPLER[part] | {part}
     elif package == "msg_adapters":
         assert {name for name in imports(path) if name.startswith("sand_sim")} <= {"sand_sim.border"}
         assert "sampler" not in names

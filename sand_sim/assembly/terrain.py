@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 from sampler import MeshError, ParticleBody, SignedDistance, locate_mesh, read_mesh, sample_body
-from sampler.surface import Surface
+from sampler.geometry.surface import Surface
 from sand_sim import rotation
 from sand_sim.assembly.true_surface import outward_triangles, reach_of_touched
 from sand_sim.scene.heights import read_heights

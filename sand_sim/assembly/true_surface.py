@@ -3,7 +3,7 @@
 import numpy as np
 
 from sampler import ParticleBody
-from sampler.surface import Surface
+from sampler.geometry.surface import Surface
 from sand_sim.reach import Reach, reach_of
 
 _NEAR = 1e-5  # of the diagonal: where sides of a triangle are looked at

@@ -7,8 +7,8 @@ import warp as wp
 from shapes import robot_mesh, wavy_ball
 
 from sampler import read_mesh, sample_file
-from sampler.closest import closest_on_triangles
-from sampler.surface import Surface
+from sampler.geometry.closest import closest_on_triangles
+from sampler.geometry.surface import Surface
 from sand_sim.assembly.true_surface import outward_triangles
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.smooth_tools import SmoothTools

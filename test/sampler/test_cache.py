@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sampler import MeshError, load_body, sample_file, sample_mesh, save_body
+from sampler import MeshError, cache, load_body, sample_file, sample_mesh, save_body
 from sampler.cache import cache_folder
 
 BUCKET = Path(__file__).parents[2] / "config" / "meshes" / "bucket.stl"
@@ -83,6 +83,12 @@ def test_another_sampler_samples_anew(box, folder, monkeypatch):
     monkeypatch.setattr("sampler.cache._code", lambda: b"of tomorrow")
     sample_file(box, 0.004)
     assert len(list(folder.iterdir())) == 2
+
+
+def test_all_of_the_sampler_is_asked_whether_it_is_the_same():
+    sources = list(Path(cache.__file__).parent.rglob("*.py"))
+    assert len(sources) > 40
+    assert all(source.read_bytes() in cache._code() for source in sources)
 
 
 def test_meshes_whose_triangles_lie_in_another_file_are_known_by_that(tmp_path):

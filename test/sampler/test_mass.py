@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 from sampler import sample_body
+from sampler.geometry.surface import Surface
 from sampler.mass import count_inside, integrate, is_physical, joined, openness, principal_axes
-from sampler.surface import Surface
 
 
 def cone():

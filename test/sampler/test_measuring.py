@@ -22,7 +22,7 @@ def test_the_worst_place_is_found(seed):
 def test_the_worst_place_is_found_among_those_kept_in_mind(monkeypatch):
     """Of many particles not all places are, and they are thrown in portions."""
     monkeypatch.setattr("sampler.measuring._MANY", 0)
-    monkeypatch.setattr("sampler.gaps._PORTION", 4000)
+    monkeypatch.setattr("sampler.particles.gaps._PORTION", 4000)
     extents = (0.1, 0.07, 0.05)
     body = sample_body(trimesh.creation.box(extents), radius=0.002, count=300)
     assert body.coverage == pytest.approx(worst_on_a_box(extents, body.points), rel=2e-3)

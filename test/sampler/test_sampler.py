@@ -9,8 +9,8 @@ import trimesh
 from spread import distances, neighbours
 
 from sampler import MeshError, SignedDistance, locate_mesh, make_field, read_mesh, sample_body
+from sampler.geometry.surface import Surface
 from sampler.sampling import thinnest_wall
-from sampler.surface import Surface
 
 MESHES = Path(__file__).parents[2] / "config" / "meshes"
 BUCKET = MESHES / "bucket.stl"

@@ -12,7 +12,7 @@ from cuda_compiling import compile_all
 import sampler
 from sampler import SignedDistance, sample_body
 from sampler.field import make_field
-from sampler.surface import Surface
+from sampler.geometry.surface import Surface
 
 GPU = pytest.mark.skipif(not wp.is_cuda_available(), reason="needs an NVIDIA GPU")
 

@@ -1,0 +1,1 @@
+"""Mesh files of all kinds, where they lie and what is refused of them."""

@@ -1,0 +1,1 @@
+"""Exact questions to triangles, and how they hang together."""

@@ -1,0 +1,1 @@
+"""Mending a mesh: cracks, turned faces, holes."""
