@@ -32,6 +32,17 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 from scenes import SceneMaker
 
+from sampler.cores import available_cores
+
+WORKER = 1.5e9  # bytes that a worker may come to take, with the processes it starts: the kernels of many scenes stay loaded
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers():
+    """A worker for each core, but no more than memory has room for."""
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    return max(1, min(available_cores(), int(memory / WORKER)))
+
 
 @pytest.fixture
 def hears_hang_up():
