@@ -15,6 +15,7 @@ _HUGE = 1000.0  # particles of so many diagonals are not meant
 _FINE = 1e-5  # nor are particles so much finer than the diagonal, which single precision would not place within their radius
 _MOST = {"variation": 0.10, "farthest": 1.10, "coverage": 1.0, "skin_coverage": 1.10}  # beyond what hard meshes need
 _LEAST = {"nearest": 0.30}
+_MEANT, _APART = {"variation": 0.065, "farthest": 1.09, "coverage": 1.0, "skin_coverage": 1.0}, 0.35  # as nearly all keep to
 _OFF = 0.01  # share by which the number of particles may differ from the wanted one
 _FEWER = "check the mesh's scale (0.001 for millimetres), or take larger particles"
 _LARGE = 0.5  # radius from which particles are large, in diagonals of the mesh
@@ -66,6 +67,13 @@ def check_thickness(thickness: float, radius: float, size: float) -> None:
 def too_many(area: float, number: float, radius: float) -> MeshError:
     """What to say of an area [m^2] that would need too many particles of a radius [m]."""
     return MeshError(f"a surface of {area:.3g} m^2 would need {number:.2g} particles of radius {radius:.3g} m; {_FEWER}")
+
+
+def unevenness(evenness: Evenness) -> float:
+    """By how much particles are beyond what is meant, all of it together; none for those as even as nearly all."""
+    beyond = [getattr(evenness, name) / limit - 1.0 for name, limit in _MEANT.items()]
+    beyond.append(1.0 - evenness.nearest / _APART)
+    return sum(max(0.0, share) for share in beyond)
 
 
 def broken_limits(evenness: Evenness, number: int, wanted: int, radius: float, size: float) -> list[str]:

@@ -9,7 +9,7 @@ import trimesh
 from sampler.body import Evenness, ParticleBody
 from sampler.errors import MeshError
 from sampler.geometry.surface import Surface
-from sampler.limits import MOST, broken_limits, check_scale, check_thickness, too_many
+from sampler.limits import MOST, broken_limits, check_scale, check_thickness, too_many, unevenness
 from sampler.mass import count_inside, integrate, is_physical, joined, openness
 from sampler.measuring import measure_evenness
 from sampler.mending.repair import SHEET, RepairedMesh, repair_mesh
@@ -27,6 +27,7 @@ _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest 
 _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
 _CROWDED = 1e-3  # nearer to one another than this, in radii, are particles whose inset surface is next to nothing
+_FEW, _STARTS = 1000, 4  # fewer particles that come out uneven are spread from so many random starts, and the best are taken
 _LOOSE = 1.1  # times what is to be expected of distance and coverage, from which strips are sought that have too few particles
 _NOTABLE = 0.01  # share of the volume that is not worth a warning
 _OPEN = 0.01  # openness of a surface from which its volume is counted, not integrated
@@ -108,10 +109,10 @@ def sample_body(
         skin, thin = _inset_skin(inside, plates, radius, fine, count)
         settle = None
 
-    def spread(skin: Skin, number: int, h: float) -> tuple[np.ndarray, np.ndarray]:
+    def spread(skin: Skin, number: int, h: float, start: int) -> tuple[np.ndarray, np.ndarray]:
         beyond = np.concatenate([beyond_edges(repaired.vertices, sheet, outer, h), beyond_layers(thin, skin, h)])
         move = partial(settle, spacing=h) if settle else lambda *placed: placed
-        points, normals = spread_particles(skin, number, seed, progress, observe, move, beyond)
+        points, normals = spread_particles(skin, number, (seed, start) if start else seed, progress, observe, move, beyond)
         return (inside.settle(points, radius, 0.2 * h) if inside else points), normals
 
     points, normals, evenness, wanted, area = _spread_tight(spread, skin, radius, fine, count, grain)
@@ -138,7 +139,7 @@ def sample_body(
 
 
 def _spread_tight(
-    spread: Callable[[Skin, int, float], tuple[np.ndarray, np.ndarray]],
+    spread: Callable[[Skin, int, float, int], tuple[np.ndarray, np.ndarray]],
     skin: Skin,
     radius: float,
     spacing: float,
@@ -148,7 +149,7 @@ def _spread_tight(
     """Spread particles, ever more of them until no grain can pass, unless their number is given.
 
     Args:
-        spread: gives centres and normals for a skin, a number of particles and their spacing [m].
+        spread: gives centres and normals for a skin, a number of particles, their spacing [m] and the number of a random start.
         skin: where they lie.
         radius: of the particles [m].
         spacing: to begin with [m].
@@ -181,8 +182,16 @@ def _spread_once(spread, skin, radius, spacing, count) -> tuple[np.ndarray, np.n
     number = count if count is not None else particle_count(area, spacing)
     if number > MOST:
         raise too_many(area, number, radius)
-    points, normals = spread(skin, number, lattice_spacing(area, number))
-    return points, normals, measure_evenness(skin, points, normals), number, area
+    best, least = None, np.inf
+    for start in range(_STARTS if 1 < number < _FEW else 1):
+        points, normals = spread(skin, number, lattice_spacing(area, number), start)
+        evenness = measure_evenness(skin, points, normals)
+        uneven = unevenness(evenness)
+        if uneven < least or best is None:
+            best, least = (points, normals, evenness, number, area), uneven
+        if not least:
+            break
+    return best
 
 
 def _skin(free: np.ndarray, solid: Surface | None, spacing: float, device: str) -> Skin:

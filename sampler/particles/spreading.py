@@ -34,7 +34,7 @@ Settler = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 def spread_particles(
     skin: Skin,
     number: int,
-    seed: int = 0,
+    seed: int | tuple[int, ...] = 0,
     progress: Callable[[float], None] = lambda share: None,
     observe: Observer | None = None,
     settle: Settler = lambda points, normals: (points, normals),
