@@ -27,7 +27,7 @@ _CLOSED = 0.92  # wanted coverage, of the largest that still stops the smallest 
 _COVERED = 0.80  # coverage to expect, in spacings
 _TRIES, _FINER = 4, 0.92
 _CROWDED = 1e-3  # nearer to one another than this, in radii, are particles whose inset surface is next to nothing
-_FEW, _STARTS = 1000, 4  # fewer particles that come out uneven are spread from so many random starts, and the best are taken
+_STARTS = (200, 8), (2000, 4)  # fewer particles that come out uneven are thrown so often at most, and the best are taken
 _LOOSE = 1.1  # times what is to be expected of distance and coverage, from which strips are sought that have too few particles
 _NOTABLE = 0.01  # share of the volume that is not worth a warning
 _OPEN = 0.01  # openness of a surface from which its volume is counted, not integrated
@@ -183,7 +183,7 @@ def _spread_once(spread, skin, radius, spacing, count) -> tuple[np.ndarray, np.n
     if number > MOST:
         raise too_many(area, number, radius)
     best, least = None, np.inf
-    for start in range(_STARTS if 1 < number < _FEW else 1):
+    for start in range(next((starts for few, starts in _STARTS if 1 < number < few), 1)):
         points, normals = spread(skin, number, lattice_spacing(area, number), start)
         evenness = measure_evenness(skin, points, normals)
         uneven = unevenness(evenness)

@@ -126,16 +126,20 @@ def inset_triangles(inside: Inside, radius: float, spacing: float) -> tuple[np.n
     thin = ball < _FULL * deep
     which, ribbons, share = narrow_ribbons(inside.skin, pieces[thin], 2.0 * deep, spacing, toward)
     thin[np.flatnonzero(thin)[which]] = False
-    wall = thin & (np.einsum("ij,ij->i", normals, other) < _OPPOSED)
+    wall = thin & _is_opposed(normals, other)
     sheets, single = np.zeros((0, 3, 3)), np.zeros(0, bool)
     if wall.any():
         found = found[~_in_walls(inside, found, deep)]
-        # Where the skins meet in the middle, only those pieces are taken that look one way more than the others.
-        taken = np.flatnonzero(wall & ((ball > radius + 0.5 * _ONE_LAYER * spacing) | ((normals - other) @ toward > 0.0)))
-        sheets = _images(inside, pieces[taken], normals[taken], radius)
-        broad = Surface.areas_of(sheets) > _FALLEN * Surface.areas_of(pieces[taken])  # not so at rims
-        wall[taken[~broad]] = False
-        sheets, single = sheets[broad], ball[taken[broad]] < radius
+        least = radius + 0.5 * _ONE_LAYER * spacing
+        k = np.flatnonzero(wall)
+        sheets, single, fallen = _layers(inside, pieces[k], normals[k], ball[k], other[k], radius, least, toward)
+        wall[k[fallen]] = False
+        # Once more with finer ones, so that layers end where they should.
+        rim, up = halve_triangles(halve_triangles(pieces[k[fallen]])), np.tile(normals[k[fallen]], (4, 1))
+        deepest, beyond = inside.balls(rim.mean(axis=1), up, deep)
+        n = np.flatnonzero((deepest < _FULL * deep) & _is_opposed(up, beyond))
+        more, also, _ = _layers(inside, rim[n], up[n], deepest[n], beyond[n], radius, least, toward)
+        sheets, single = np.concatenate([sheets, more]), np.concatenate([single, also])
     if len(ribbons):
         found = found[_farther(found.mean(axis=1), ribbons, _THREAD * spacing)]
     layers = np.concatenate([np.ones(len(found) + len(sheets)), share])
@@ -155,6 +159,25 @@ def inset_triangles(inside: Inside, radius: float, spacing: float) -> tuple[np.n
         single = np.append(single, np.zeros(len(rest), bool))
     sound = Surface.areas_of(found) > 0.0
     return found[sound], layers[sound], single[sound]
+
+
+def _is_opposed(normals: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return np.einsum("ij,ij->i", normals, other) < _OPPOSED
+
+
+def _layers(inside, pieces, normals, ball, other, radius, least, toward) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What lies one radius below pieces of walls, or in the middle of them.
+
+    Where the skins meet in the middle, with balls smaller than ``least``, only pieces that look ``toward`` one way are taken.
+
+    Returns:
+        Triangles, shape (n, 3, 3) [m]; which of them are the only layer, shape (n,); numbers of the pieces of which hardly
+        anything is left, as at rims.
+    """
+    taken = np.flatnonzero((ball > least) | ((normals - other) @ toward > 0.0))
+    sheets = _images(inside, pieces[taken], normals[taken], radius)
+    broad = Surface.areas_of(sheets) > _FALLEN * Surface.areas_of(pieces[taken])
+    return sheets[broad], ball[taken[broad]] < radius, taken[~broad]
 
 
 def _farther(points: np.ndarray, triangles: np.ndarray, least: np.ndarray | float) -> np.ndarray:
@@ -181,7 +204,7 @@ def _in_walls(inside: Inside, triangles: np.ndarray, deep: float) -> np.ndarray:
     up = touched - middle
     up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), np.finfo(float).tiny)
     ball, other = inside.balls(touched, up, deep)
-    return (ball < _FULL * deep) & (np.einsum("ij,ij->i", up, other) < _OPPOSED)
+    return (ball < _FULL * deep) & _is_opposed(up, other)
 
 
 def _images(inside: Inside, pieces: np.ndarray, normals: np.ndarray, radius: float) -> np.ndarray:
@@ -190,7 +213,7 @@ def _images(inside: Inside, pieces: np.ndarray, normals: np.ndarray, radius: flo
     corners, up = corners.reshape(-1, 3), np.repeat(normals, 3, axis=0)
     ball, other = inside.balls(corners, up, radius)
     place = corners - ball[:, None] * up
-    stuck = np.flatnonzero((ball < _FULL * radius) & (np.einsum("ij,ij->i", up, other) > _OPPOSED))  # at another face
+    stuck = np.flatnonzero((ball < _FULL * radius) & ~_is_opposed(up, other))  # at another face
     place[stuck] = inside.sink(place[stuck], radius)[0]
     place = place.reshape(-1, 3, 3)
     middle = place.mean(axis=1, keepdims=True)
