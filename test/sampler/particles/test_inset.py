@@ -113,9 +113,10 @@ def test_no_grain_passes_between_inset_particles():
     body = sample_body(box, radius, grain=grain, inset=True)
     worst = worst_on_a_box(np.array(extents) - 2.0 * radius, body.points)
     assert worst < radius + grain
-    few = sample_body(box, radius, count=len(body) // 3, inset=True)
+    few = len(body) // 3
+    passing = 0.98 * sample_body(box, radius, count=few, inset=True).coverage - radius
     with pytest.raises(MeshError, match="could pass"):
-        sample_body(box, radius, count=len(few), grain=0.98 * few.coverage - radius, inset=True)
+        sample_body(box, radius, count=few, grain=passing, inset=True)
 
 
 def test_contours_keep_sharp_edges():
