@@ -51,7 +51,8 @@ def test_what_lies_otherwise_than_it_should_is_told():
 
 
 def test_what_a_single_particle_leaves_open_is_told():
-    assert "coverage" in sample_body(trimesh.creation.box((12.0, 1.0, 1.0)), radius=0.4, count=1).warnings[-1]
+    """Wherever it lies: half a bar is longer than a spacing, the diagonal of two cubes shorter."""
+    assert "coverage" in sample_body(trimesh.creation.box((30.0, 1.0, 1.0)), radius=0.4, count=1).warnings[-1]
     assert not sample_body(trimesh.creation.box((2.0, 1.0, 1.0)), radius=0.4, count=1).warnings
 
 
