@@ -243,7 +243,7 @@ def test_thick_sheets_get_two_skins_and_thin_ones_one_layer():
 def test_particles_keep_off_the_rims_of_sheets_so_that_they_lie_as_evenly_as_on_solids(width, count):
     plate = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, width, 0], [0, width, 0]], [[0, 1, 2], [0, 2, 3]], process=False)
     variations = []
-    for seed in range(3):
+    for seed in range(3 if count > 100 else 10):  # one start in three is uneven on the narrow strip, so that others must be tried
         body = sample_body(plate, radius=0.01, count=count, seed=seed)
         even = body.evenness
         assert even.variation < 0.05
