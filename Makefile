@@ -12,10 +12,10 @@ VIEW ?=
 .PHONY: demo run test test-full lint clean
 
 demo: $(READY)
-	$(VENV)/bin/sand_sim demo $(SCENE) --out $(OUT) $(if $(VIEW),--view)
+	$(VENV)/bin/sand_sim demo "$(SCENE)" --out "$(OUT)" $(if $(VIEW),--view)
 
 run: $(READY)
-	$(VENV)/bin/sand_sim run $(SCENE) --out $(OUT) $(if $(VIEW),--view)
+	$(VENV)/bin/sand_sim run "$(SCENE)" --out "$(OUT)" $(if $(VIEW),--view)
 
 test: $(READY)
 	$(VENV)/bin/python -m pytest -n logical --dist loadgroup -m "not slow"
@@ -37,4 +37,4 @@ $(READY): setup.py constraints.txt
 	touch $(READY)
 
 clean:
-	rm -rf $(VENV) $(OUT) build install log *.egg-info
+	rm -rf $(VENV) "$(OUT)" build install log *.egg-info
