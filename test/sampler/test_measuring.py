@@ -51,8 +51,9 @@ def test_what_lies_otherwise_than_it_should_is_told():
 
 
 def test_what_a_single_particle_leaves_open_is_told():
-    """Wherever it lies: half a bar is longer than a spacing, the diagonal of two cubes shorter."""
-    assert "coverage" in sample_body(trimesh.creation.box((30.0, 1.0, 1.0)), radius=0.4, count=1).warnings[-1]
+    """Wherever it lies: the other of two cubes is farther than a spacing, the corner of a block nearer."""
+    cubes = [trimesh.creation.box((1.0, 1.0, 1.0)).apply_translation([30.0 * k, 0.0, 0.0]) for k in range(2)]
+    assert "coverage" in sample_body(trimesh.util.concatenate(cubes), radius=0.4, count=1).warnings[-1]
     assert not sample_body(trimesh.creation.box((2.0, 1.0, 1.0)), radius=0.4, count=1).warnings
 
 
