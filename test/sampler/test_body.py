@@ -239,22 +239,18 @@ def test_thick_sheets_get_two_skins_and_thin_ones_one_layer():
     assert thin.inertia[2, 2] == pytest.approx(thin.volume * 0.1**2 / 6.0, rel=1e-9)
 
 
-@pytest.mark.parametrize(("width", "count"), [(1.0, 400), (0.1, 400), (0.03, 60)])
+@pytest.mark.parametrize(("width", "count"), [(1.0, 1600), (0.1, 400), (0.03, 60)])
 def test_particles_keep_off_the_rims_of_sheets_so_that_they_lie_as_evenly_as_on_solids(width, count):
     plate = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, width, 0], [0, width, 0]], [[0, 1, 2], [0, 2, 3]], process=False)
-    variations = []
     for seed in range(3 if count > 100 else 10):  # one start in three is uneven on the narrow strip, so that others must be tried
         body = sample_body(plate, radius=0.01, count=count, seed=seed)
         even = body.evenness
-        assert even.variation < 0.05
-        variations.append(even.variation)
+        assert even.variation < 0.035
         assert even.farthest < 1.09
         assert even.coverage < (0.8 if width > 0.05 else 1.0)  # a zigzag in a strip little wider than h leaves corners
-        places = np.random.default_rng(seed).uniform(0.0, [1.0, width, 0.0], (200 * count, 3))
-        found = distances(places, body.points).max() / body.spacing
+        found = worst_place(plate, body.points, 20 * count) / body.spacing
         assert found < (0.8 if width > 0.05 else 1.0)
         assert found <= even.coverage + 1e-6
-    assert np.mean(variations) < 0.035  # single ones are a matter of chance
 
 
 def test_a_branching_sheet_becomes_one_closed_solid():
