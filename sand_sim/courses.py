@@ -85,13 +85,15 @@ class Courses:
         unstamped: number of poses without a time that were carried out.
         alike: number of commands with the time of the one before, which have taken its place.
         shift: from the clock of relative stamps to simulated time [s]; None before the first of them.
+        placed: tools that their first pose, since the start or a reset, puts where it says instead of sending them there.
     """
 
     def __init__(self, world: World, lockstep: bool, rules: StampRules):
         self.lockstep, self.rules = lockstep, rules
         self.limited = self.unstamped = self.alike = 0
         self.delays: dict[str, float] = {}
-        self._world = world
+        self.placed: frozenset[str] = frozenset()
+        self._world, self._has_placed = world, False
         self.clear()
 
     def clear(self) -> None:
@@ -119,11 +121,20 @@ class Courses:
         """When the next waiting command begins [s]; infinity if none waits."""
         return min((self._world.arrival(name) for name, course in self.by_tool.items() if course.waiting), default=np.inf)
 
-    def take(self, commands: list[Command], reject: Callable[[CommandError], None]) -> None:
+    def place(self, tool: str, position, orientation=None) -> None:
+        """As ``World.place_tool``, and what the tool has been told is forgotten."""
+        self._world.place_tool(tool, position, orientation)
+        self.by_tool[tool] = Course(last_taken=self._world.time)
+
+    def take(self, commands: list[Command], reject: Callable[[CommandError], None]) -> bool:
         """Check commands that came in together and carry them out, or let them wait.
 
         Of those of one tool that replace each other only the last good one is carried out.
+
+        Returns:
+            Whether a tool has been put somewhere else.
         """
+        self._has_placed = False
         good: list[Command] = []
         for command in commands:
             if self._ends_late_ones(command):
@@ -140,6 +151,7 @@ class Courses:
             if k > last.get(command.tool, -1):
                 self._done(self._append, command, reject)
         self.begin_waiting(reject)
+        return self._has_placed
 
     def begin_waiting(self, reject: Callable[[CommandError], None]) -> None:
         """Set the tools that have arrived on their way to what waits for them."""
@@ -229,7 +241,13 @@ class Courses:
         ahead = self._world.time + 0.5 * self._world.time_step  # stamps are rounded to nanoseconds: that of now may lie above it
         return isinstance(command, ToolPose) and command.time is not None and command.time > ahead
 
+    def _begin_there(self, command: Command) -> None:
+        if command.tool in self.placed and isinstance(command, ToolPose) and self.by_tool[command.tool].last_taken == -np.inf:
+            self._world.place_tool(command.tool, command.position, command.orientation)
+            self._has_placed = True
+
     def _append(self, command: Command) -> None:
+        self._begin_there(command)
         course, now = self.by_tool[command.tool], self._world.time
         if course.waiting and command.time == course.waiting[-1].time:
             course.waiting[-1] = command
@@ -242,6 +260,7 @@ class Courses:
         course.promised, course.last_taken = command.time, now
 
     def _replace(self, command: Command) -> None:
+        self._begin_there(command)
         course, now, rules = self.by_tool[command.tool], self._world.time, self.rules
         if isinstance(command, ToolVelocity):
             target, interval = self._pose_within_reach(command, rules.hold), rules.hold

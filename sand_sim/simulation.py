@@ -154,7 +154,7 @@ class Simulation:
 
     def reset(self) -> Future:
         """Go back to time zero and forget all commands; the future is done when the new observation has been shown."""
-        return self.request(self._reset)
+        return self.change(self._reset)
 
     def change(self, act: Callable[[], Any]) -> Future:
         """As ``request``, and the world is shown when it has been changed."""
@@ -183,7 +183,7 @@ class Simulation:
         The future gives the simulated time [s] when the new observation has been shown, or ``CheckpointError`` for a file that
         cannot be used; all is as it was then.
         """
-        return self.request(lambda: self._load(path))
+        return self.change(lambda: self._load(path))
 
     def resume(self) -> bool:
         """Go on from the newest good checkpoint, if there is one, as ``CheckpointFolder.resume``; call it before ``start``."""
@@ -234,7 +234,9 @@ class Simulation:
             self._inbox.clear()
         if self.fault is None:
             with np.errstate(over="ignore", invalid="ignore"):  # what comes of huge numbers is refused
-                self.courses.take(commands, self.reject)
+                placed = self.courses.take(commands, self.reject)
+            if placed:
+                self._on_frame(self.world.observe())
         else:
             for command in commands:
                 self.reject(CommandError("stopped", f"tool '{command.tool}': stepping has stopped, reset to go on"))
@@ -298,7 +300,6 @@ class Simulation:
         self.courses.clear()
         self.courses.heed_late_ones(before)
         self._frame_end = self.world.time + self.frame
-        self._on_frame(self.world.observe())
 
     def _checkpoint(self) -> Checkpoint:
         return take_checkpoint(self.world, pack_told(self.courses, self.rejected, self._frame_end), self._pack_history())
@@ -308,7 +309,6 @@ class Simulation:
         before = self.world.time
         load_checkpoint(path, self.world, self._take_over)
         self.courses.heed_late_ones(before)
-        self._on_frame(self.world.observe())
         return self.world.time
 
     def _take_over(self, checkpoint: Checkpoint) -> None:

@@ -309,3 +309,39 @@ def test_a_clock_is_forgotten_with_the_commands(tmp_path):
         assert driven.courses.promised == pytest.approx(driven.world.time + 0.1, abs=1e-6)
         driven.courses.clear()
     assert driven.rejected == {}
+
+
+def test_a_first_pose_may_say_where_a_tool_begins(driven):
+    """Not sent there, which would take half a second at its 1 m/s; what comes after it is a way, until commands are forgotten."""
+    driven.courses.placed = frozenset({"plate"})
+    for _ in range(2):
+        begin = driven.world.time
+        assert driven.courses.take([pose(0.5, begin + 0.1), pose(0.6, begin + 0.3)], driven.reject)
+        assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.5])
+        assert not driven.courses.take([pose(0.7, begin + 0.5)], driven.reject)
+        for time, height in ((0.1, 0.5), (0.2, 0.55), (0.3, 0.6), (0.4, 0.65)):
+            driven.go_to(begin + time)
+            assert driven.tool.position[2] - START[2] == pytest.approx(height, abs=2e-5)
+        driven.courses.clear()
+    assert not driven.rejected
+
+
+def test_a_first_pose_in_the_bed_is_refused_and_the_next_one_is_the_first(driven):
+    driven.courses.placed = frozenset({"plate"})
+    assert not driven.courses.take([pose(-0.055)], driven.reject)
+    assert driven.rejected == {"blocked": 1}
+    assert driven.tool.position == pytest.approx(START)
+    assert driven.courses.take([pose(0.1), pose(-0.055)], driven.reject), "the last good one"
+    assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.1])
+
+
+def test_a_tool_that_is_put_somewhere_else_forgets_what_waits(driven):
+    driven.take(pose(0.1, 0.2), pose(0.2, 0.4))
+    driven.go_to(0.1)
+    driven.courses.place("plate", START + [0.1, 0.0, 0.1])
+    driven.go_to(0.5)
+    assert driven.tool.position == pytest.approx(START + [0.1, 0.0, 0.1])
+    driven.take(pose(0.2, 0.45))  # before the stamp that has been forgotten
+    driven.go_to(1.0)
+    assert driven.tool.position == pytest.approx(START + [0.0, 0.0, 0.2])
+    assert not driven.rejected

@@ -1,17 +1,19 @@
-"""The part of a world that changes what is in it while it runs: grains come and go, tools get other bodies."""
+"""The part of a world that changes what is in it while it runs: grains come and go, tools get other bodies and places."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from sand_sim.assembly.assemble import Assembly
-from sand_sim.border import Health
+from sand_sim.border import Health, ToolPose
 from sand_sim.changes.carrying_over import carry_over, rebuild
 from sand_sim.changes.exchange import check_room, find_grains, read_grains
 from sand_sim.changes.tool_exchange import check_tool, read_tool
+from sand_sim.changes.tool_placing import check_place, forget_motion
 from sand_sim.grain_table import GrainTable
 from sand_sim.readout.beforehand import find_coarseness, find_fine_surfaces
 from sand_sim.readout.observing import balance_rounding, observe_grains, observe_spheres
+from sand_sim.tool_motion.track import Track
 
 
 class Changeable:
@@ -86,6 +88,31 @@ class Changeable:
         other = rebuild(self.assembly, self.assembly.table, tools)
         carry_over(self.assembly, other, replaced=index)
         self._go_on_with(other)
+
+    def place_tool(self, tool: str, position, orientation=None) -> None:
+        """Put a tool somewhere else at once, where it rests: for a trial that begins there, or to begin where a robot is.
+
+        It sweeps nothing on the way and needs no time; where it was told to go is forgotten. ``reset`` brings it back.
+
+        Args:
+            tool: name.
+            position: of the tool frame's origin, shape (3,) [m].
+            orientation: of the tool frame, quaternion x y z w of any length but zero, shape (4,); as it is if None.
+
+        Raises:
+            CommandError: if the pose makes no sense, or the tool would cut deeper into grains there by a tenth of a radius;
+                nothing is changed then.
+        """
+        index = self._index_of(tool)
+        now = self._poses[index]
+        place = self.check(ToolPose(tool, position, now[1] if orientation is None else orientation))
+        self._health()
+        check_place(self.assembly, index, now, place, observe_spheres(self.assembly))
+        self._sweep()
+        forget_motion(self.assembly, index)
+        self._set_tracks([*self._tracks[:index], Track.rest(place), *self._tracks[index + 1 :]])
+        self._swept.jump(index, place.position, place.orientation)
+        self._go_on_with(self.assembly)
 
     def _go_on_with(self, assembly: Assembly) -> None:
         """Go on with other grains or tools, after a moment in which no time has passed.

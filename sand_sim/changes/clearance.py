@@ -1,4 +1,4 @@
-"""Whether spheres fit where they are asked for: clear of grains, of each other, of walls, tools, terrains and bodies."""
+"""Whether things fit where they are asked for: spheres clear of all there is, tools clear of grains."""
 
 from collections.abc import Iterator
 
@@ -6,9 +6,11 @@ import numpy as np
 
 from sand_sim import rotation
 from sand_sim.assembly.assemble import Assembly
+from sand_sim.assembly.tool_model import ToolModel
 from sand_sim.border import CommandError, GrainCloud
 from sand_sim.readout.observing import observe_bodies, observe_grains
 from sand_sim.scene.overlapping import TooManyPairsError, overlapping
+from sand_sim.scene.stable_step import DEEP
 from sand_sim.scene.types import Pose
 
 _TOUCH = 1e-6  # of a radius: what may overlap by rounding
@@ -52,6 +54,32 @@ def find_obstacles(
     for solid, start, now in solids:
         blocked[solid.label] = np.flatnonzero(solid.distance(as_at_start(position, start, now)) < radius - spare)
     return {name: np.unique(which) for name, which in blocked.items() if len(which)}
+
+
+def find_cut(before: tuple[ToolModel, np.ndarray, np.ndarray], after: tuple, spheres: GrainCloud) -> str:
+    """How a tool with another mesh, or elsewhere, would cut deeper into grains by more than ``DEEP`` of a radius.
+
+    Args:
+        before: the tool, its position, shape (3,) [m], and orientation, shape (4,), now.
+        after: the same as it shall be.
+        spheres: from ``observe_spheres``.
+
+    Returns:
+        What it would do, with how many grains, how deep and where; empty if nothing.
+    """
+    radius = spheres.radius.astype(float)
+    reach = max(before[0].extent, after[0].extent)
+    near = np.flatnonzero(np.linalg.norm(spheres.position - after[1], axis=1) < reach + radius)
+    was, now = (
+        1.0 - model.distance(as_at_start(spheres.position[near], model.tool.pose, pose)) / radius[near]
+        for model, *pose in (before, after)
+    )
+    deeper = now - np.maximum(was, 0.0)
+    blocked = deeper > DEEP
+    if not blocked.any():
+        return ""
+    place = spheres.position[near[np.argmax(deeper)]].round(4).tolist()
+    return f"cuts into {blocked.sum()} grains by more than {DEEP:g} of a radius, the deepest at {place} m by {deeper.max():.2g}"
 
 
 def _gather(parts: Iterator[np.ndarray]) -> np.ndarray:

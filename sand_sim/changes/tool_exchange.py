@@ -8,8 +8,7 @@ from sampler import MeshError, locate_mesh, read_mesh
 from sand_sim.assembly.assemble import Assembly
 from sand_sim.assembly.tool_model import ToolModel, model_tool, with_mesh
 from sand_sim.border import CommandError, GrainCloud
-from sand_sim.changes.clearance import as_at_start
-from sand_sim.scene.stable_step import DEEP
+from sand_sim.changes.clearance import find_cut
 from sand_sim.scene.types import SceneError, Tool
 
 
@@ -61,17 +60,6 @@ def check_tool(assembly: Assembly, tools: list[ToolModel], index: int, pose: tup
             f"{name}: the new mesh has particles {model.body.spacing:.3g} m apart, which ask for a time step of {safe:.3g} s; "
             f"it is {step.value:.3g} s. Load the scene with it",
         )
-    radius = spheres.radius.astype(float)
-    reach = max(model.extent, assembly.tools[index].extent)
-    near = np.flatnonzero(np.linalg.norm(spheres.position - pose[0], axis=1) < reach + radius)
-    there = as_at_start(spheres.position[near], model.tool.pose, pose)
-    was, now = (1.0 - one.distance(there) / radius[near] for one in (assembly.tools[index], model))
-    deeper = now - np.maximum(was, 0.0)
-    blocked = deeper > DEEP
-    if blocked.any():
-        place = spheres.position[near[np.argmax(deeper)]].round(4).tolist()
-        raise CommandError(
-            "blocked",
-            f"{name}: the new mesh cuts into {blocked.sum()} grains by more than {DEEP:g} of a radius, the deepest at {place} "
-            f"m by {deeper.max():.2g}; move the tool away first",
-        )
+    fault = find_cut((assembly.tools[index], *pose), (model, *pose), spheres)
+    if fault:
+        raise CommandError("blocked", f"{name}: the new mesh {fault}; move the tool away first")

@@ -1,4 +1,4 @@
-"""Services that change the world between two frames: states, grains, meshes."""
+"""Services that change the world between two frames: states, grains, meshes and places of tools."""
 
 import re
 from collections.abc import Callable
@@ -23,7 +23,7 @@ _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 
 
 class ChangeServices:
-    """Answers ``save_state``, ``load_state``, ``spawn_grains``, ``remove_grains`` and ``set_tool_mesh``.
+    """Answers ``save_state``, ``load_state``, ``spawn_grains``, ``remove_grains``, ``set_tool_mesh`` and ``place_tool``.
 
     Args:
         connections: where services are made.
@@ -41,6 +41,7 @@ class ChangeServices:
             ("spawn_grains", {"position": _NUMBERS, "radius": _NUMBER}, {"material": _TEXT, "velocity": _NUMBERS}, self._spawn),
             ("remove_grains", {}, {"id": _WHOLE, "low": _NUMBERS, "high": _NUMBERS}, self._remove),
             ("set_tool_mesh", {"tool": _TEXT, "mesh": _TEXT}, {"scale": _NUMBER}, self._set_mesh),
+            ("place_tool", {"tool": _TEXT, "position": _NUMBERS}, {"orientation": _NUMBERS}, self._place),
         ):
             connections.service(SetParametersAtomically, f"~/{name}", self._answering(needed, optional, ask))
 
@@ -101,6 +102,13 @@ class ChangeServices:
             self._world.set_tool_mesh(tool, str(path), scale)
             warnings = next(one.body.warnings for one in self._world.tools if one.tool.name == tool)
             return "; ".join([f"tool '{tool}' has mesh {path.name}", *warnings])
+
+        return self._simulation.change(act)
+
+    def _place(self, tool: str, position: list, orientation: list | None = None):
+        def act() -> str:
+            self._simulation.courses.place(tool, position, orientation)
+            return f"tool '{tool}' is there"
 
         return self._simulation.change(act)
 

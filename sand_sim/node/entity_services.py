@@ -1,7 +1,7 @@
 """The entities of ``simulation_interfaces``: tools and free rigid bodies, told and, tools only, moved."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from rclpy.node import Node
@@ -105,33 +105,23 @@ class EntityServices:
         elif self._node.refusal:
             response.result = wrong_state(self._node.refusal)
         else:
-            response.result = await self._go(report.name, request.state)
+            response.result = await self._place(report.name, request.state)
         return response
 
-    async def _go(self, tool: str, state):
+    async def _place(self, tool: str, state):
         try:
             command, frame = state_to_command(state, tool), state.header.frame_id or self._frames.root
             with np.errstate(over="ignore", invalid="ignore"):  # what comes of huge numbers is refused
-                place = self._frames.in_root(frame, command.position, command.orientation)
-                command = self._simulation.world.check(replace(command, position=place[0], orientation=place[1]))
+                position, orientation = self._frames.in_root(frame, command.position, command.orientation)
+                command = self._simulation.world.check(ToolPose(tool, position, orientation))
         except CommandError as error:
             self._simulation.reject(error)
             invalid = getattr(srv.SetEntityState.Response, "INVALID_POSE", msg.Result.RESULT_OPERATION_FAILED)
             code = msg.Result.RESULT_OPERATION_FAILED if error.reason == "unknown_frame" else invalid
             return msg.Result(result=code, error_message=str(error))
-        good, told = await self._services.outcome(lambda: self._simulation.request(lambda: self._take(command)))
+        place = partial(self._simulation.courses.place, tool, command.position, command.orientation)
+        good, told = await self._services.outcome(lambda: self._simulation.change(place))
         return succeeded() if good else failed(told)
-
-    def _take(self, command: ToolPose) -> None:
-        """Carry a command out in the stepping thread."""
-        if self._simulation.fault is not None:
-            raise CommandError("stopped", "stepping has stopped; reset to go on")
-        errors: list[CommandError] = []
-        with np.errstate(over="ignore", invalid="ignore"):
-            self._simulation.courses.take([command], errors.append)
-        for error in errors:
-            self._simulation.reject(error)
-            raise error
 
     def _state(self, report: ToolReport | BodyReport, time: float):
         velocity = report.velocity

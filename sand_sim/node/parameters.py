@@ -16,6 +16,7 @@ from sand_sim.simulation import PACINGS
 
 _OF_ROS = ("use_sim_time", "start_type_description_service")
 SOURCES = ("pose", "twist", "tf")
+STARTS = ("scene", "first_pose")
 WRENCH_FRAMES = ("tool", "world")
 _SCENE = "dig"
 
@@ -88,6 +89,7 @@ def tool_declarations(tool: str, link: str = "") -> tuple[Declaration, ...]:
     """The parameters of one tool, which may be a link of a robot."""
     return (
         Declaration(f"tools.{tool}.source", "pose", "Topic that drives the tool.", choices=SOURCES),
+        Declaration(f"tools.{tool}.start", "scene", "Where the tool begins, at the start and after a reset.", choices=STARTS),
         Declaration(f"tools.{tool}.frame", link or tool, "Frame that is the tool's, for TF."),
         Declaration(f"tools.{tool}.wrench_frame", "tool", "Axes of the wrench.", choices=WRENCH_FRAMES, changeable=True),
     )

@@ -47,8 +47,10 @@ class ToolInputs:
         self.frames, self._fixed = frames, frames.names
         self._followers: dict[str, str] = {}
         self._followed: dict[str, float] = {}
-        for tool in simulation.world.scene.tools:
-            self._connect(connections, tool.name)
+        names = [tool.name for tool in simulation.world.scene.tools]
+        simulation.courses.placed = frozenset(name for name in names if parameters[f"tools.{name}.start"] == "first_pose")
+        for name in names:
+            self._connect(connections, name)
         if tf2_msgs.TFMessage is not None:
             connections.subscription(tf2_msgs.TFMessage, "/tf", lambda message: self._hear_frames(message, False))
             connections.subscription(tf2_msgs.TFMessage, "/tf_static", lambda message: self._hear_frames(message, True), True)
@@ -140,11 +142,13 @@ def check_sources(parameters: Parameters, tools: Sequence[str]) -> None:
     """See that all tools can be driven as the parameters ask.
 
     Raises:
-        ValueError: if one is to follow TF and its messages are not installed.
+        ValueError: if one is to follow TF and its messages are not installed, or to begin at poses that do not come.
     """
     for tool in tools:
         if parameters[f"tools.{tool}.source"] == "tf" and tf2_msgs.TFMessage is None:
             raise ValueError(f"parameter tools.{tool}.source: 'tf' needs the package tf2_msgs, which is not installed")
+        if parameters[f"tools.{tool}.source"] == "twist" and parameters[f"tools.{tool}.start"] == "first_pose":
+            raise ValueError(f"parameter tools.{tool}.start: 'first_pose' needs poses, and its source is 'twist'; take 'scene'")
 
 
 def fixed_frames(parameters: Parameters, of_robot: Sequence[Frame] = ()) -> FrameTree:

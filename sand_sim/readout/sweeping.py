@@ -64,13 +64,17 @@ class SweptGround:
             self._passed[index] = []
         return self.volumes
 
+    def jump(self, tool: int, position: np.ndarray, orientation: np.ndarray) -> None:
+        """Put a tool somewhere else, on no way there; what it lies in has been swept."""
+        self._poses[tool], self._passed[tool] = (position, orientation), []
+        self._stand(tool)
+
     def set_tools(self, tools: list[ToolModel]) -> None:
         """Give tools other bodies where they are; what these lie in has been swept."""
         for index, model in enumerate(tools):
             if model is not self._tools[index]:
                 self._tools[index], self._surfaces[index] = model, SignedDistance(model.mesh)
-                inside = self._inside(index, np.argwhere(self.ground & ~self.swept[index]))
-                self.swept[index][tuple(inside.T)] = True
+                self._stand(index)
 
     def save(self) -> dict[str, np.ndarray]:
         """What has been swept, as plain arrays."""
@@ -94,6 +98,11 @@ class SweptGround:
         )
         self._poses = list(zip(state["swept.position"], state["swept.orientation"], strict=True))
         self._passed = [[] for _ in self._poses]
+
+    def _stand(self, index: int) -> None:
+        """Mark the cells that a tool lies in."""
+        inside = self._inside(index, np.argwhere(self.ground & ~self.swept[index]))
+        self.swept[index][tuple(inside.T)] = True
 
     def _inside(self, index: int, cells: np.ndarray) -> np.ndarray:
         """Those of some cells, shape (n, 3), whose middles are inside a tool now."""

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from sand_sim import rotation
+from sand_sim.border import ToolPose
 from sand_sim.reach import Reach
 from sand_sim.scene.types import Pose, Scene, Waypoint
 
@@ -30,7 +31,7 @@ class Track:
     end_orientation: np.ndarray
 
     @classmethod
-    def rest(cls, pose: Pose) -> "Track":
+    def rest(cls, pose: Pose | ToolPose) -> "Track":
         """Stay at a pose."""
         position, orientation = np.asarray(pose.position, float), np.asarray(pose.orientation, float)
         return cls(0.0, 0.0, position, position, orientation, orientation)

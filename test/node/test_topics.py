@@ -274,11 +274,13 @@ def follow(monkeypatch):
         "frame_names": [""],
         "stamps": "simulated",
         "tools.plate.source": "tf",
+        "tools.plate.start": "scene",
         "tools.plate.frame": "tcp",
     }
     scene = SimpleNamespace(tools=[SimpleNamespace(name="plate")])
     world = SimpleNamespace(scene=scene)
-    simulation = SimpleNamespace(world=world, submit=submitted.append, reject=rejected.append, pacing="realtime", frame=0.02)
+    common = {"world": world, "courses": SimpleNamespace(), "pacing": "realtime", "frame": 0.02}
+    simulation = SimpleNamespace(submit=submitted.append, reject=rejected.append, **common)
 
     def tell(topic, *frames):
         heard[topic](SimpleNamespace(transforms=[frame_to_transform(frame) for frame in frames]))

@@ -1,0 +1,82 @@
+"""Where a tool begins: as the scene says, where its first pose says, or where it is put."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy", reason="needs ROS 2")
+
+pytestmark = pytest.mark.xdist_group("processes")
+
+from geometry_msgs.msg import PoseStamped
+from node_client import START
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
+
+ELSEWHERE = [0.1, -0.1, 0.2]
+
+
+@pytest.fixture
+def places(client):
+    """Where the plate was last told to be."""
+    heard = []
+
+    def hear(message):
+        at = message.pose.position
+        heard.append([at.x, at.y, at.z])
+
+    client.node.create_subscription(PoseStamped, "/sand_sim/tools/plate/pose_actual", hear, 10)
+    return heard
+
+
+def test_a_tool_begins_where_its_arm_is(client, start_node, places):
+    """Also while the run is held; the second pose is a way, and after a reset the next one is the first again."""
+    node = start_node(pacing="fast", paused=True, **{"tools.plate.start": "first_pose"})
+    client.connect()
+    for begin in (ELSEWHERE, [-0.1, 0.1, 0.1]):
+        client.send(begin)
+        client.wait_for(lambda: places and places[-1] == pytest.approx(begin))  # noqa: B023
+        assert client.time == 0.0
+        client.send(START)
+        client.call(Trigger, "step")
+        client.wait_for(lambda: client.time > 0.0)
+        assert 0.02 < np.linalg.norm(node.simulation.world.observe().tools[0].position - START) < 0.3, "on its way"
+        client.call(Trigger, "reset")
+        client.wait_for(lambda: places[-1] == pytest.approx(START))
+    assert node.simulation.rejected == {}
+
+
+def test_a_tool_is_put_somewhere_else(client, start_node, places):
+    node = start_node(pacing="lockstep")
+    client.connect()
+
+    def put(**arguments):
+        parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in arguments.items()]
+        result = client.call(SetParametersAtomically, "place_tool", SetParametersAtomically.Request(parameters=parameters)).result
+        return result.successful, result.reason
+
+    assert put(tool="plate", position=ELSEWHERE, orientation=[0.0, 0.0, 2.0, 0.0]) == (True, "tool 'plate' is there")
+    client.wait_for(lambda: places and places[-1] == pytest.approx(ELSEWHERE))
+    report = node.simulation.request(node.simulation.world.observe).result(30.0).tools[0]
+    assert report.orientation == pytest.approx([0.0, 0.0, 1.0, 0.0])
+    for arguments, reason in (
+        ({"position": ELSEWHERE}, "argument 'tool' is missing"),
+        ({"tool": "spade", "position": ELSEWHERE}, "'spade' is unknown"),
+        ({"tool": "plate", "position": [0.0, 0.0]}, "position must be of shape (3,)"),
+        ({"tool": "plate", "position": [0.0, 0.0, float("nan")]}, "must be finite"),
+        ({"tool": "plate", "position": ELSEWHERE, "orientation": [0.0] * 4}, "orientation is"),
+        ({"tool": "plate", "position": [0.015, 0.015, 0.01]}, "cuts into"),
+    ):
+        good, told = put(**arguments)
+        assert not good
+        assert reason in told
+    report = node.simulation.request(node.simulation.world.observe).result(30.0).tools[0]
+    assert report.position == pytest.approx(ELSEWHERE)
+    client.send(START, at=1.0)
+    client.wait_for(lambda: client.time > 0.99)
+    client.wait_for(lambda: places[-1] == pytest.approx(START))
+
+
+def test_velocities_tell_no_place_to_begin(ros, start_node):
+    with pytest.raises(ValueError, match=r"tools\.plate\.start: 'first_pose' needs poses, and its source is 'twist'"):
+        start_node(**{"tools.plate.start": "first_pose", "tools.plate.source": "twist"})
