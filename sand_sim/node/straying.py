@@ -51,6 +51,6 @@ class StrayWatch:
                 self._warn(
                     f"tool '{tool}' is told to go where it gets {delay:.1f} s later than asked at its max_speed of "
                     f"{self._world.scene.tool(tool).max_speed:g} m/s; see that its poses are in metres, of the frame that they "
-                    f"name, and begin where the tool is (pose_actual; tools.{tool}.start:=first_pose makes it begin where they do), "
-                    "or raise max_speed in the scene"
+                    f"name, and begin where the tool is (pose_actual), or let it begin where they do (tools.{tool}.start:="
+                    "first_pose), or raise max_speed in the scene"
                 )
