@@ -7,6 +7,7 @@ import numpy as np
 from sampler.body import Evenness
 from sampler.errors import MeshError
 from sampler.geometry.surface import Surface
+from sampler.geometry.vectors import extremes
 
 MOST = 2_000_000  # particles, more are not meant
 _LONG = 200_000  # particles take so long that it is told before
@@ -32,7 +33,8 @@ def check_scale(triangles: np.ndarray, radius: float, spacing: float) -> None:
     Raises:
         MeshError: if they would be far too many, or far larger or far smaller than the mesh.
     """
-    size = float(np.linalg.norm(np.ptp(triangles, axis=(0, 1))))
+    low, high = extremes(triangles)
+    size = float(np.linalg.norm(high - low))
     if max(radius, spacing) > _HUGE * size:
         raise MeshError(
             f"particles of radius {radius:.3g} m, {spacing:.3g} m apart, are far larger than the mesh, {size:.3g} m across; "

@@ -9,6 +9,7 @@ import trimesh
 from sampler.body import Evenness, ParticleBody
 from sampler.errors import MeshError
 from sampler.geometry.surface import Surface
+from sampler.geometry.vectors import extremes
 from sampler.limits import MOST, broken_limits, check_scale, check_thickness, too_many, unevenness
 from sampler.mass import count_inside, integrate, is_physical, joined, openness
 from sampler.measuring import measure_evenness
@@ -116,7 +117,8 @@ def sample_body(
         return (inside.settle(points, radius, 0.2 * h) if inside else points), normals
 
     points, normals, evenness, wanted, area = _spread_tight(spread, skin, radius, fine, count, grain)
-    size = float(np.linalg.norm(np.ptp(repaired.triangles, axis=(0, 1))))  # of sheets, too
+    low, high = extremes(repaired.triangles)
+    size = float(np.linalg.norm(high - low))  # of sheets, too
     doubtful = broken_limits(evenness, len(points), wanted, radius, size)
     if spacing is not None and fine < spacing:
         doubtful.append(f"particles lie {fine:.3g} m apart, not {spacing:.3g} m, or grains of radius {grain:.3g} m could pass")
@@ -252,14 +254,13 @@ def thinnest_wall(surface: Surface) -> float:
 
     From random places, and from the middle of every triangle: of a small fin random ones may all miss.
     """
-    points, normals = Skin(surface.triangles).sample(_WALL_SAMPLES, np.random.default_rng(0))
-    sound = surface.areas > 0.0
-    points = np.concatenate([points, surface.triangles[sound].mean(axis=1)])
-    normals = np.concatenate([normals, surface.normals[sound]])
-    step = 1e-5 * surface.unit
-    face, way = surface.cast(points - step * normals, -normals)
-    opposed = (face >= 0) & (np.einsum("ij,ij->i", surface.normals[face], normals) < -0.9)
-    return float(way[opposed].min() + step) if opposed.any() else float("inf")
+    sound, step, thinnest = surface.areas > 0.0, 1e-5 * surface.unit, float("inf")
+    middles = surface.triangles[sound].mean(axis=1), surface.normals[sound]
+    for points, normals in (Skin(surface.triangles).sample(_WALL_SAMPLES, np.random.default_rng(0)), middles):
+        face, way = surface.cast(points - step * normals, -normals, 1.001 * thinnest)  # what is thicker need not be found
+        opposed = (face >= 0) & (np.einsum("ij,ij->i", surface.normals[face], normals) < -0.9)
+        thinnest = min(thinnest, float(way[opposed].min() + step) if opposed.any() else thinnest)
+    return thinnest
 
 
 def _spacing(radius, spacing, count, grain, triangles) -> float:
@@ -296,7 +297,7 @@ def _mass(solid, around, free, parent, layers, plates, thickness, closed) -> tup
     volume, centre, inertia = joined(parts)
     if len(plates) and outside and outside[0] > _NOTABLE * volume:
         warnings.append("sheets reach into solids, so what they add to volume and inertia is counted from places beside them")
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    low, high = extremes(corners)
     if is_physical(volume, centre, inertia, low, high):
         return volume, centre, inertia, warnings
     if len(plates):  # those that lie on one another count twice

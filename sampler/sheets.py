@@ -134,10 +134,10 @@ def _common_corners(faces: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[tu
 def _corner_offsets(normal: np.ndarray, joined: np.ndarray) -> np.ndarray:
     """Move of each joined corner that takes it one unit away from all its planes, least squares, shape (k, 3)."""
     number = int(joined.max()) + 1
-    matrix = np.zeros((number, 3, 3))
-    np.add.at(matrix, joined, normal[:, :, None] * normal[:, None, :])
-    right = np.zeros((number, 3))
-    np.add.at(right, joined, normal)
+    x, y, z = normal.T
+    sums = [np.bincount(joined, values, number) for values in (x, y, z, x * x, x * y, x * z, y * y, y * z, z * z)]
+    right = np.stack(sums[:3], axis=1)
+    matrix = np.stack([sums[k] for k in (3, 4, 5, 4, 6, 7, 5, 7, 8)], axis=1).reshape(-1, 3, 3)
     value, vector = np.linalg.eigh(matrix)
     sound = value > 1e-2 * value[:, -1:]
     share = np.einsum("kji,kj->ki", vector, right) * np.where(sound, 1.0 / np.where(sound, value, 1.0), 0.0)

@@ -6,7 +6,7 @@ import numpy as np
 
 from sampler.errors import MeshError
 from sampler.files.polygons import are_hollow
-from sampler.geometry.loops import span_loop
+from sampler.geometry.loops import span_loops
 
 _MARK = b"\xef\xbb\xbf"  # of UTF-8, which some editors put first
 _BESIDE = re.compile(rb"(?<=\d)/\S*")
@@ -96,10 +96,10 @@ def _without_hollow_polygons(data: bytes) -> bytes:
     sizes = np.array([len(polygon) for polygon in words], int)
     begin = np.cumsum(sizes) - sizes
     hollow = are_hollow(vertices[corners], sizes)
-    parts, done = [], 0
-    for k in np.flatnonzero(hollow):
-        triangles = span_loop(vertices, corners[begin[k] : begin[k] + sizes[k]]) + 1
-        parts += [data[done : found[k].start()], *(b"\nf %d %d %d" % tuple(triangle) for triangle in triangles)]
+    parts, done, hollow = [], 0, np.flatnonzero(hollow)
+    cut = span_loops(vertices, [corners[begin[k] : begin[k] + sizes[k]] for k in hollow])
+    for k, triangles in zip(hollow, cut, strict=True):
+        parts += [data[done : found[k].start()], *(b"\nf %d %d %d" % tuple(triangle) for triangle in triangles + 1)]
         done = found[k].end()
     return b"".join([*parts, data[done:]])
 

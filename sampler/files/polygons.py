@@ -4,7 +4,7 @@ import numpy as np
 import trimesh
 
 from sampler.errors import MeshError
-from sampler.geometry.loops import span_loop
+from sampler.geometry.loops import span_loops
 
 
 def mesh_of(name: str, vertices: np.ndarray, corners: np.ndarray, sizes: np.ndarray) -> trimesh.Trimesh:
@@ -48,7 +48,7 @@ def cut_polygons(points: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     for corners, hollow in _alike(points, sizes):
         k = np.arange(1, corners.shape[1] - 1)
         triangles.append(corners[~hollow][:, np.stack([0 * k, k, k + 1], axis=1)].reshape(-1, 3))
-        triangles += [span_loop(points, loop) for loop in corners[hollow]]
+        triangles += span_loops(points, corners[hollow])
     return np.concatenate(triangles)
 
 

@@ -3,6 +3,8 @@
 import numpy as np
 import warp as wp
 
+from sampler.geometry.vectors import cross
+
 
 @wp.func
 def closest_on_edge(a: wp.vec3d, b: wp.vec3d) -> wp.vec3d:
@@ -62,17 +64,12 @@ def closest_on_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarra
             better = far < least
             best, least = np.where(better[:, None], near, best), np.where(better, far, least)
     a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    normal = np.cross(u, v)
+    normal = cross(u, v)
     square = np.einsum("ij,ij->i", normal, normal)
     safe = np.where(square > 0.0, square, 1.0)
     out = points - a
-    p = np.einsum("ij,ij->i", np.cross(out, v), normal) / safe
-    q = np.einsum("ij,ij->i", np.cross(u, out), normal) / safe
+    p = np.einsum("ij,ij->i", cross(out, v), normal) / safe
+    q = np.einsum("ij,ij->i", cross(u, out), normal) / safe
     inside = (square > 0.0) & (p >= 0.0) & (q >= 0.0) & (p + q <= 1.0)
     foot = points - (np.einsum("ij,ij->i", out, normal) / safe)[:, None] * normal
     return np.where(inside[:, None], foot, best)
-
-
-def lengths(vectors: np.ndarray) -> np.ndarray:
-    """Of vectors, shape (..., 3), several times as fast as NumPy's norm; shape (...)."""
-    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))

@@ -5,8 +5,9 @@ from functools import cached_property
 import numpy as np
 import warp as wp
 
-from sampler.geometry.closest import closest_on_triangles, lengths
+from sampler.geometry.closest import closest_on_triangles
 from sampler.geometry.rays import closing_cones, count_windings, leavings_between
+from sampler.geometry.vectors import cross, extremes, lengths
 from sampler.launching import launch_shares
 
 ASIDE = wp.constant(1.0e-5)  # of the diagonal: how much nearer the wrong side of a wall must be to be taken
@@ -153,10 +154,11 @@ class Surface:
     def __init__(self, triangles: np.ndarray, device: str = "cpu"):
         self.device = device
         self.triangles = np.asarray(triangles, float)
-        low, high = self.triangles.min(axis=(0, 1)), self.triangles.max(axis=(0, 1))
+        low, high = extremes(self.triangles)
         self.centre, self.unit = 0.5 * (low + high), float(np.linalg.norm(high - low))
         self.half = 0.5 * (high - low) / self.unit
-        self.areas, self.normals = self.areas_of(self.triangles), self.normals_of(self.triangles)
+        upright, self.areas = _upright(self.triangles)
+        self.normals = _units(upright, self.areas)
 
     @cached_property
     def mesh(self) -> wp.Mesh:
@@ -183,8 +185,7 @@ class Surface:
     @staticmethod
     def normals_of(triangles: np.ndarray) -> np.ndarray:
         """Unit normals of triangles, shape (n, 3, 3) [m]; zero where they have no area."""
-        cross, area = _upright(triangles)
-        return np.divide(0.5 * cross, area[:, None], out=np.zeros_like(cross), where=area[:, None] > 0.0)
+        return _units(*_upright(triangles))
 
     def shift(self, points: np.ndarray) -> wp.array:
         """Points in the frame and unit of the queries."""
@@ -296,5 +297,10 @@ def tangents(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _upright(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Normals of triangles, shape (n, 3, 3) [m], twice as long as their areas [m^2], and these."""
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return cross, 0.5 * lengths(cross)
+    upright = cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return upright, 0.5 * lengths(upright)
+
+
+def _units(upright: np.ndarray, areas: np.ndarray) -> np.ndarray:
+    """Unit normals from what ``_upright`` gives; zero where there is no area."""
+    return np.divide(0.5 * upright, areas[:, None], out=np.zeros_like(upright), where=areas[:, None] > 0.0)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sampler.geometry.loops import span_loop
+from sampler.geometry.loops import span_loops
 from sampler.geometry.topology import edges_of
 
 
@@ -35,14 +35,13 @@ def close_holes(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) 
         faces: shape (m, 3).
         component: of each face, shape (m,).
     """
-    caps, owners, loops = [np.zeros((0, 3), np.int64)], [], []
-    for owner, loop in boundary_loops(faces, component):
-        caps.append(span_loop(vertices, loop))
-        owners.append(owner)
-        loops.append(loop)
-    owner, number = np.array(owners, np.int64), [len(cap) for cap in caps[1:]]
+    found = list(boundary_loops(faces, component))
+    owner, loops = np.array([owner for owner, _ in found], np.int64), [loop for _, loop in found]
+    caps = span_loops(vertices, loops)
+    number = [len(cap) for cap in caps]
+    spanned = np.concatenate([np.zeros((0, 3), np.int64), *caps])
     turn = _turns(vertices, faces, component, owner, loops)
-    return Caps(np.concatenate(caps), np.repeat(owner, number), np.repeat(np.arange(len(number)), number), loops, turn)
+    return Caps(spanned, np.repeat(owner, number), np.repeat(np.arange(len(number)), number), loops, turn)
 
 
 def _turns(vertices, faces, component, owner: np.ndarray, loops: list[np.ndarray]) -> np.ndarray:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from sampler.geometry.closest import lengths
+from sampler.geometry.vectors import lengths
 from sampler.launching import launch_shares
 from sampler.particles.cells import add_lists, cell_numbers, cells_around, empty_cells, sort_into_cells
 from sampler.particles.climbing import climb

@@ -6,6 +6,7 @@ import numpy as np
 
 from sampler.geometry.contour import contour_triangles
 from sampler.geometry.surface import Surface
+from sampler.geometry.vectors import extremes
 from sampler.particles.rows import ROW, narrow_ribbons
 from sampler.particles.skin import halve_triangles, longest_edges
 
@@ -116,7 +117,7 @@ def inset_triangles(inside: Inside, radius: float, spacing: float) -> tuple[np.n
     cell = _CELL * spacing
     deep = radius + cell  # thinner walls may slip through between the cells
     triangles = inside.skin.triangles
-    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    low, high = extremes(triangles)
     found = contour_triangles(inside.depth, low - 0.37 * cell, high + 0.37 * cell, radius, cell)
     pieces = _pieces(triangles, _PIECE * max(spacing, radius))
     middle, normals = pieces.mean(axis=1), Surface.normals_of(pieces)

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from sampler.geometry.closest import lengths
 from sampler.geometry.surface import Surface
 from sampler.geometry.topology import link_items
+from sampler.geometry.vectors import extremes, lengths
 from sampler.particles.crossing import count_layers, crossing_planes, cut_triangles, have_before
 
 _STEP = 2e-5  # of the diagonal: how far before and behind a face is asked what is there
@@ -141,7 +141,7 @@ def touchable_parts(triangles: np.ndarray, solid: Surface | None, spacing: float
     Left out are triangles too narrow to have a normal; folds, on which more of the solid's faces look the other way, so that
     those are the skin there; the ends of slits; and specks, such as pinholes between parts, farther than a spacing from the rest.
     """
-    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    low, high = extremes(triangles)
     narrow = _NARROW * np.linalg.norm(high - low) * longest_edges(triangles)
     triangles = triangles[2.0 * Surface.areas_of(triangles) > narrow]
     if solid is not None and len(triangles):

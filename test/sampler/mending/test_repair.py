@@ -7,7 +7,7 @@ from shapes import THIN, robot_mesh, wavy_ball
 
 from benchmarks.sampler_damage import damaged, far_from_surface, grid_around, solid_angle_inside
 from sampler import SignedDistance, read_mesh, repair_mesh, sample_body
-from sampler.geometry.loops import span_loop
+from sampler.geometry.loops import span_loops
 from sampler.geometry.surface import Surface
 from sampler.mass import integrate
 from sampler.mending.repair import CAP, SHEET
@@ -267,6 +267,6 @@ def test_a_jagged_loop_is_spanned_within_its_edge(tips):
     angle = np.arange(2 * tips) * np.pi / tips
     reach = np.where(np.arange(2 * tips) % 2, 1.0, 2.0)
     star = np.stack([reach * np.cos(angle), reach * np.sin(angle), np.full(2 * tips, 3.0)], axis=1)
-    corners = star[span_loop(star, np.arange(2 * tips))]
+    corners = star[span_loops(star, [np.arange(2 * tips)])[0]]
     area = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert np.linalg.norm(area, axis=1).sum() == pytest.approx(2 * tips * 0.5 * 2.0 * 1.0 * np.sin(np.pi / tips))
