@@ -59,7 +59,7 @@ def plan_text(plan: Plan) -> str:
     lines += [f"  {'others':32} {(sum(plan.arrays.values()) - sum(s for _, s in largest)) / plan.spheres:7.1f} B per sphere"]
     lines += ["", f"kernels ({len(plan.kernels)}): " + ", ".join(plan.kernels)]
     step = plan.time_step
-    lines += ["", f"time step {step['value']:.3g} s, decided by {step['reason']} (safe: {step['safe']:.3g} s)"]
+    lines += ["", f"time step {step['value']:.3g} s; safe is {step['safe']:.3g} s, decided by {step['reason']}"]
     lines += [f"  contact time {step['contact']:.3g} s, Rayleigh time {step['rayleigh']:.3g} s, at {step['speed']:.3g} m/s"]
     lines += [f"  {step['warning']}"] if step["warning"] else []
     lines.append(f"cost: {plan.steps:,} steps")
