@@ -30,7 +30,8 @@ def check_place(assembly: Assembly, index: int, now: tuple, place: ToolPose, sph
     model = assembly.tools[index]
     fault = find_cut((model, *now), (model, place.position, place.orientation), spheres)
     if fault:
-        raise CommandError("blocked", f"{name} {fault}, if it is put there; put it elsewhere, or send it there")
+        remedy = "put it elsewhere, or give it that pose in the scene, so that the bed settles around it"
+        raise CommandError("blocked", f"{name} {fault}, if it is put there; {remedy}")
 
 
 def forget_motion(assembly: Assembly, index: int) -> None:
