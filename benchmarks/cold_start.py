@@ -62,6 +62,8 @@ def _start(scene: str, caches: Path, progress) -> dict:
 
 def main() -> None:
     """Time this process, in wall seconds since its start; to be run by ``time_cold_start``."""
+    if BEGIN not in os.environ:
+        sys.exit("this is one of the processes that are timed by: sand_sim bench cold-start")
     begin = float(os.environ[BEGIN])
     from sand_sim import World, load_scene
     from sand_sim.config_folder import find_scene
