@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 
 from msg_adapters.builtin_interfaces import time_to_stamp
-from msg_adapters.geometry_msgs import command_to_pose, command_to_twist, pose_to_command
+from msg_adapters.geometry_msgs import command_to_pose, command_to_twist, pose_to_command, twist_to_command
 from sand_sim.border import BodyReport, ToolPose, ToolReport, ToolVelocity
 
 try:
@@ -61,6 +61,11 @@ def report_to_state(report: ToolReport | BodyReport, velocity: np.ndarray, time:
 def state_to_command(state, tool: str) -> ToolPose:
     """The pose of an ``EntityState`` to a command without a time, in the frame of its header."""
     return pose_to_command(PoseStamped(pose=state.pose), tool)
+
+
+def state_to_velocity(state, body: str) -> ToolVelocity:
+    """The twist of an ``EntityState`` to the velocity of a frame's origin, in the axes of its header's frame."""
+    return twist_to_command(TwistStamped(twist=state.twist), body, False)
 
 
 def texts_to_info(category: int, description: str, tags: list[str]):

@@ -1,4 +1,4 @@
-"""The part of a world that changes what is in it while it runs: grains come and go, tools get other bodies and places."""
+"""The part of a world that changes what is in it while it runs: grains come and go, tools and bodies get other places."""
 
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from sand_sim.assembly.assemble import Assembly
 from sand_sim.border import Health, ToolPose
+from sand_sim.changes.body_placing import put_body, read_body
 from sand_sim.changes.carrying_over import carry_over, rebuild
 from sand_sim.changes.exchange import check_room, find_grains, read_grains
 from sand_sim.changes.tool_exchange import check_tool, read_tool
@@ -112,6 +113,25 @@ class Changeable:
         forget_motion(self.assembly, index)
         self._set_tracks([*self._tracks[:index], Track.rest(place), *self._tracks[index + 1 :]])
         self._swept.jump(index, place.position, place.orientation)
+        self._go_on_with(self.assembly)
+
+    def place_body(self, body: str, position, orientation=None, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) -> None:
+        """Put a free rigid body somewhere else at once, also one that has left the domain; ``reset`` brings it back.
+
+        Args:
+            body: name.
+            position: of the origin of its own frame, shape (3,) [m].
+            orientation: of its own frame, quaternion x y z w of any length but zero, shape (4,).
+            velocity: of its centre of mass, shape (3,) [m/s].
+            spin: shape (3,) [rad/s], world frame; of all of them, what is None stays as it is.
+
+        Raises:
+            CommandError: if they make no sense, or it would overlap anything by a tenth of a radius; the message says what, and
+                nothing is changed then.
+        """
+        self._health()
+        rows = read_body(self.assembly, body, position, orientation, velocity, spin)
+        put_body(self.assembly, body, rows, observe_spheres(self.assembly), self._poses)
         self._go_on_with(self.assembly)
 
     def _go_on_with(self, assembly: Assembly) -> None:

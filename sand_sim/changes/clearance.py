@@ -17,7 +17,7 @@ _TOUCH = 1e-6  # of a radius: what may overlap by rounding
 
 
 def find_obstacles(
-    assembly: Assembly, spheres: GrainCloud, poses: list, position: np.ndarray, radius: np.ndarray
+    assembly: Assembly, spheres: GrainCloud, poses: list, position: np.ndarray, radius: np.ndarray, of_body: str = ""
 ) -> dict[str, np.ndarray]:
     """What is in the way of new spheres.
 
@@ -27,6 +27,7 @@ def find_obstacles(
         poses: position [m] and orientation of each tool now.
         position: of the new spheres, shape (n, 3) [m].
         radius: shape (n,) [m].
+        of_body: name of the body whose spheres they are, and which is in nobody's way, if they are of one.
 
     Returns:
         For each obstacle by name, which of the new spheres overlap it, shape (k,) int; empty if all are clear.
@@ -36,8 +37,10 @@ def find_obstacles(
     """
     spare = _TOUCH * radius + 2.0 * assembly.lattice.quantum
     grains = (one for one, _ in overlapping(position, radius - spare, spheres.position, spheres.radius.astype(float)))
-    pairs = overlapping(position, radius - 0.5 * spare, position, radius - 0.5 * spare)
-    each_other = (one[one != other] for one, other in pairs)
+    each_other = iter(())
+    if not of_body:
+        pairs = overlapping(position, radius - 0.5 * spare, position, radius - 0.5 * spare)
+        each_other = (one[one != other] for one, other in pairs)
     try:
         blocked = {"grains": _gather(grains), "one another": _gather(each_other)}
     except TooManyPairsError as error:
@@ -49,8 +52,9 @@ def find_obstacles(
     solids += [(g, g.pose, (g.place, g.pose.orientation)) for g in assembly.grounds]
     models = {model.body.name: model for model in assembly.bodies}
     for report in observe_bodies(assembly, observe_grains(assembly, spheres)):
-        model = models[report.name]
-        solids.append((model, model.body.pose, (report.position, report.orientation)))
+        if report.name != of_body:
+            model = models[report.name]
+            solids.append((model, model.body.pose, (report.position, report.orientation)))
     for solid, start, now in solids:
         blocked[solid.label] = np.flatnonzero(solid.distance(as_at_start(position, start, now)) < radius - spare)
     return {name: np.unique(which) for name, which in blocked.items() if len(which)}

@@ -8,7 +8,7 @@ from sand_sim.changes.clearance import find_obstacles
 from sand_sim.grain_table import GrainTable
 from sand_sim.readout.cloud_selection import in_box
 
-_FASTEST = 0.5  # radii in a step, beyond which a grain would be taken for a blown-up run
+FASTEST = 0.5  # radii in a step, beyond which a grain would be taken for a blown-up run
 
 
 def read_grains(assembly: Assembly, position, radius, material: str | None, velocity) -> GrainTable:
@@ -52,9 +52,9 @@ def read_grains(assembly: Assembly, position, radius, material: str | None, velo
     if outside.any():
         box = f"{assembly.lattice.low.round(6).tolist()} to {assembly.lattice.high.round(6).tolist()} m"
         raise CommandError("outside", f"{_some(outside, position)} outside of the domain, {box}")
-    fast = np.linalg.norm(velocity, axis=1) * assembly.time_step.value > _FASTEST * radius
+    fast = np.linalg.norm(velocity, axis=1) * assembly.time_step.value > FASTEST * radius
     if fast.any():
-        most = _FASTEST * float(radius[fast].min()) / assembly.time_step.value
+        most = FASTEST * float(radius[fast].min()) / assembly.time_step.value
         raise CommandError("too_fast", f"{_some(fast, position)} too fast for the time step; at most {most:.3g} m/s")
     density = assembly.scene.materials[assembly.scene.material_index(material)].density
     kind = np.full(number, material_order(assembly.scene).index(material))

@@ -1,4 +1,4 @@
-"""Services that change the world between two frames: states, grains, meshes and places of tools."""
+"""Services that change the world between two frames: states, grains, meshes, places of tools and bodies."""
 
 import re
 from collections.abc import Callable
@@ -18,12 +18,13 @@ from sand_sim.simulation import Simulation
 
 _TEXT, _NUMBER = Parameter.Type.STRING, Parameter.Type.DOUBLE
 _NUMBERS, _WHOLE = Parameter.Type.DOUBLE_ARRAY, Parameter.Type.INTEGER_ARRAY
+_OF_BODY = ("orientation", "velocity", "spin")  # that may be left out
 _MOST_GRAINS = 1_000_000  # that one request may add
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 
 
 class ChangeServices:
-    """Answers ``save_state``, ``load_state``, ``spawn_grains``, ``remove_grains``, ``set_tool_mesh`` and ``place_tool``.
+    """Answers ``save_state``, ``load_state``, ``spawn_grains`` and all else that changes the world.
 
     Args:
         connections: where services are made.
@@ -42,6 +43,7 @@ class ChangeServices:
             ("remove_grains", {}, {"id": _WHOLE, "low": _NUMBERS, "high": _NUMBERS}, self._remove),
             ("set_tool_mesh", {"tool": _TEXT, "mesh": _TEXT}, {"scale": _NUMBER}, self._set_mesh),
             ("place_tool", {"tool": _TEXT, "position": _NUMBERS}, {"orientation": _NUMBERS}, self._place),
+            ("place_body", {"body": _TEXT, "position": _NUMBERS}, dict.fromkeys(_OF_BODY, _NUMBERS), self._put),
         ):
             connections.service(SetParametersAtomically, f"~/{name}", self._answering(needed, optional, ask))
 
@@ -109,6 +111,13 @@ class ChangeServices:
         def act() -> str:
             self._simulation.courses.place(tool, position, orientation)
             return f"tool '{tool}' is there"
+
+        return self._simulation.change(act)
+
+    def _put(self, body: str, **where: list):
+        def act() -> str:
+            self._world.place_body(body, **where)
+            return f"body '{body}' is there"
 
         return self._simulation.change(act)
 

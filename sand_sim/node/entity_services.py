@@ -1,4 +1,4 @@
-"""The entities of ``simulation_interfaces``: tools and free rigid bodies, told and, tools only, moved."""
+"""The entities of ``simulation_interfaces``: tools and free rigid bodies, told and put elsewhere."""
 
 from collections.abc import Callable
 from functools import partial
@@ -12,6 +12,7 @@ from msg_adapters.simulation_interfaces import (
     report_to_state,
     srv,
     state_to_command,
+    state_to_velocity,
     texts_to_info,
 )
 from sand_sim import rotation
@@ -21,7 +22,9 @@ from sand_sim.node.frames import FrameTree
 from sand_sim.node.name_pattern import NamePattern, PatternError
 from sand_sim.node.services import Services
 from sand_sim.simulation import Simulation
+from sand_sim.tool_motion.commands import check_command
 
+_NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
 FEATURES = (
     "ENTITY_TAGS",
     "ENTITY_CATEGORIES",
@@ -96,39 +99,61 @@ class EntityServices:
         response.result, report = _find(self._now()[1], request.entity)
         if report is None:
             return response
-        if isinstance(report, BodyReport):
-            response.result = unsupported(f"'{request.entity}' is a free rigid body; only tools can be set")
-        elif getattr(request, "set_twist", False) or getattr(request, "set_acceleration", False):
+        pose, twist = getattr(request, "set_pose", True), getattr(request, "set_twist", False)  # the first versions have no flags
+        if getattr(request, "set_acceleration", False):
+            response.result = unsupported(f"'{request.entity}': an acceleration cannot be set, only set_pose and set_twist")
+        elif twist and isinstance(report, ToolReport):
             response.result = unsupported(f"'{request.entity}' is a tool; only its pose can be set (set_pose)")
-        elif not getattr(request, "set_pose", True):  # the first versions have no such flags
-            response.result = failed("nothing is to be set; set_pose is false")
+        elif not (pose or twist):
+            response.result = failed("nothing is to be set; set_pose and set_twist are false")
         elif self._node.refusal:
             response.result = wrong_state(self._node.refusal)
         else:
-            response.result = await self._place(report.name, request.state)
+            response.result = await self._put(report, request.state, pose, twist)
         return response
 
-    async def _place(self, tool: str, state):
+    async def _put(self, report: ToolReport | BodyReport, state, pose: bool, twist: bool):
         try:
-            command, frame = state_to_command(state, tool), state.header.frame_id or self._frames.root
             with np.errstate(over="ignore", invalid="ignore"):  # what comes of huge numbers is refused
-                position, orientation = self._frames.in_root(frame, command.position, command.orientation)
-                command = self._simulation.world.check(ToolPose(tool, position, orientation))
+                act = self._putting(report, state, pose, twist)
         except CommandError as error:
             self._simulation.reject(error)
             invalid = getattr(srv.SetEntityState.Response, "INVALID_POSE", msg.Result.RESULT_OPERATION_FAILED)
             code = msg.Result.RESULT_OPERATION_FAILED if error.reason == "unknown_frame" else invalid
             return msg.Result(result=code, error_message=str(error))
-        place = partial(self._simulation.courses.place, tool, command.position, command.orientation)
-        good, told = await self._services.outcome(lambda: self._simulation.change(place))
+        good, told = await self._services.outcome(lambda: self._simulation.change(act))
         return succeeded() if good else failed(told)
+
+    def _putting(self, report: ToolReport | BodyReport, state, pose: bool, twist: bool) -> Callable[[], None]:
+        """What puts an entity where a state says, and gives it that velocity.
+
+        Raises:
+            CommandError: if the state makes no sense by itself.
+        """
+        frame, tool = state.header.frame_id or self._frames.root, isinstance(report, ToolReport)
+        position = orientation = velocity = spin = None
+        if pose:
+            command = state_to_command(state, report.name)
+            command = ToolPose(report.name, *self._frames.in_root(frame, command.position, command.orientation))
+            command = check_command(command, "" if tool else f"body '{report.name}'")
+            position, orientation = command.position, command.orientation
+        if tool:
+            return partial(self._simulation.courses.place, report.name, position, orientation)
+        if twist:
+            moving, turn = state_to_velocity(state, report.name), self._frames.in_root(frame, np.zeros(3), _NO_TURN)[1]
+            velocity, spin = rotation.rotate(turn, moving.linear), rotation.rotate(turn, moving.angular)
+            velocity = velocity + self._of_centre(report.name, spin, report.orientation if orientation is None else orientation)
+        return partial(self._simulation.world.place_body, report.name, position, orientation, velocity, spin)
+
+    def _of_centre(self, body: str, spin: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+        """How much faster the centre of mass of a body moves than its frame's origin [m/s]."""
+        model = next(model for model in self._simulation.world.assembly.bodies if model.body.name == body)
+        return np.cross(spin, rotation.rotate(orientation, model.shape.middle))
 
     def _state(self, report: ToolReport | BodyReport, time: float):
         velocity = report.velocity
-        if isinstance(report, BodyReport):
-            # The report has the velocity of the centre of mass.
-            model = next(model for model in self._simulation.world.assembly.bodies if model.body.name == report.name)
-            velocity = velocity - np.cross(report.spin, rotation.rotate(report.orientation, model.shape.middle))
+        if isinstance(report, BodyReport):  # which has that of the centre of mass
+            velocity = velocity - self._of_centre(report.name, report.spin, report.orientation)
         return report_to_state(report, velocity, time, self._frames.root)
 
 

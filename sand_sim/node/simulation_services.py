@@ -65,7 +65,7 @@ class SimulationServices:
     def _tell_features(self, _, response):
         told = (
             f"sand_sim. A step is a frame of {self._simulation.frame:g} s. Reset is of time and state together. Entities are "
-            "tools and free rigid bodies; SetEntityState puts a tool somewhere else at once, clear of grains, and moves no body."
+            "tools and free rigid bodies; SetEntityState puts them somewhere else at once, where there is room."
         )
         response.features = names_to_features(FEATURES, told)
         return response

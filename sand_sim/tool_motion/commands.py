@@ -11,13 +11,17 @@ from sand_sim.border import CommandError, ToolPose, ToolVelocity
 Command = ToolPose | ToolVelocity
 
 
-def check_command(command: Command) -> Command:
+def check_command(command: Command, label: str = "") -> Command:
     """The command, its orientation brought to length one.
+
+    Args:
+        command: to a tool.
+        label: what messages call that, if not a tool.
 
     Raises:
         CommandError: if pose, velocity or time are no finite numbers, not of their shape, or the quaternion is zero.
     """
-    tool = f"tool '{command.tool}'"
+    tool = label or f"tool '{command.tool}'"
     moving = isinstance(command, ToolVelocity)
     names = ("linear", "angular") if moving else ("position", "orientation")
     try:

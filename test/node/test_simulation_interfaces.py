@@ -329,8 +329,47 @@ def test_a_tool_is_put_at_a_pose(run, client, package):
     assert sent(frame="moon", **target) == results.RESULT_OPERATION_FAILED
     assert sent(set_pose=False, **target) == results.RESULT_OPERATION_FAILED
     assert sent(set_twist=True, **target) == results.RESULT_FEATURE_UNSUPPORTED
-    assert sent("ball", **target) == results.RESULT_FEATURE_UNSUPPORTED
     assert sent("moon", **target) == results.RESULT_NOT_FOUND
+    assert node.process.poll() is None
+
+
+def test_a_body_is_put_at_a_pose_with_a_velocity(run, package):
+    """In the axes of a frame that is turned left; what is not set stays as it is."""
+    results, codes = package.msg.Result, package.srv.SetEntityState.Response
+    base = {"frame_names": "[base]", "frames.base.pose": "[0.1, 0.0, 0.0, 0.0, 0.0, 1.5707963267948966]"}
+    node = run(pacing="fast", paused=True, **base)
+
+    def put(position=None, linear=None, angular=(0.0, 0.0, 0.0), frame="base", **further):
+        state = package.msg.EntityState()
+        state.header.frame_id, state.pose.orientation.w = frame, 1.0
+        point, twist = state.pose.position, state.twist
+        for message, values in ((point, position), (twist.linear, linear), (twist.angular, angular)):
+            message.x, message.y, message.z = values or (0.0, 0.0, 0.0)
+        flags = {"set_pose": position is not None, "set_twist": linear is not None} | further
+        return node.ask("SetEntityState", entity="ball", state=state, **flags).result.result
+
+    def ball():
+        state = node.ask("GetEntityState", entity="ball").state
+        parts = state.pose.position, state.twist.linear, state.twist.angular
+        return [np.array([part.x, part.y, part.z]) for part in parts]
+
+    assert put((0.05, 0.2, 0.15)) == results.RESULT_OK
+    position, linear, angular = ball()
+    np.testing.assert_allclose(position, [-0.1, 0.05, 0.15], atol=1e-7)
+    np.testing.assert_allclose(angular, [0.0, 0.0, 3.0], rtol=1e-5)
+    np.testing.assert_allclose(linear, [3.0 * 0.01, 0.0, 0.0], atol=1e-6)  # of the frame's origin: its centre still rests
+    assert put(linear=(0.2, 0.0, 0.1), angular=(0.0, 1.0, 0.0)) == results.RESULT_OK
+    position, linear, angular = ball()
+    np.testing.assert_allclose(position, [-0.1, 0.05, 0.15], atol=1e-7)
+    np.testing.assert_allclose(linear, [0.0, 0.2, 0.1], atol=1e-6)
+    np.testing.assert_allclose(angular, [-1.0, 0.0, 0.0], atol=1e-6)
+
+    assert put((float("nan"), 0.0, 0.0)) == codes.INVALID_POSE
+    assert put((0.015, 0.085, 0.01)) == results.RESULT_OPERATION_FAILED, "among the grains"
+    assert put(linear=(1e6, 0.0, 0.0)) == results.RESULT_OPERATION_FAILED
+    assert put((0.05, 0.2, 0.15), frame="moon") == results.RESULT_OPERATION_FAILED
+    assert put() == results.RESULT_OPERATION_FAILED, "nothing is to be set"
+    assert put((0.05, 0.2, 0.15), set_acceleration=True) == results.RESULT_FEATURE_UNSUPPORTED
     assert node.process.poll() is None
 
 

@@ -1,4 +1,6 @@
-"""Where a tool begins: as the scene says, where its first pose says, or where it is put."""
+"""Where tools begin: as the scene says, where their first poses say, or where they are put; and where bodies are put."""
+
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,6 +16,12 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 ELSEWHERE = [0.1, -0.1, 0.2]
+
+
+def ask(client, name, **arguments):
+    parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in arguments.items()]
+    result = client.call(SetParametersAtomically, name, SetParametersAtomically.Request(parameters=parameters)).result
+    return result.successful, result.reason
 
 
 @pytest.fixture
@@ -49,12 +57,7 @@ def test_a_tool_begins_where_its_arm_is(client, start_node, places):
 def test_a_tool_is_put_somewhere_else(client, start_node, places):
     node = start_node(pacing="lockstep")
     client.connect()
-
-    def put(**arguments):
-        parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in arguments.items()]
-        result = client.call(SetParametersAtomically, "place_tool", SetParametersAtomically.Request(parameters=parameters)).result
-        return result.successful, result.reason
-
+    put = partial(ask, client, "place_tool")
     assert put(tool="plate", position=ELSEWHERE, orientation=[0.0, 0.0, 2.0, 0.0]) == (True, "tool 'plate' is there")
     client.wait_for(lambda: places and places[-1] == pytest.approx(ELSEWHERE))
     report = node.simulation.request(node.simulation.world.observe).result(30.0).tools[0]
@@ -75,6 +78,26 @@ def test_a_tool_is_put_somewhere_else(client, start_node, places):
     client.send(START, at=1.0)
     client.wait_for(lambda: client.time > 0.99)
     client.wait_for(lambda: places[-1] == pytest.approx(START))
+
+
+def test_a_body_is_put_somewhere_else(client, start_node):
+    bell = {"spheres": [[-0.01, 0, 0, 0.01], [0.012, 0, 0, 0.008]], "material": "sand", "pose": {"position": [0.1, 0.1, 0.1]}}
+    node = start_node({"bodies": {"bell": bell}}, pacing="lockstep")
+    client.connect()
+    put = partial(ask, client, "place_body")
+    assert put(body="bell", position=ELSEWHERE, velocity=[0.0, 0.0, 1.0], spin=[0.0, 2.0, 0.0]) == (True, "body 'bell' is there")
+    report = node.simulation.request(node.simulation.world.observe).result(30.0).bodies[0]
+    assert report.position == pytest.approx(ELSEWHERE, abs=1e-7)
+    assert report.velocity == pytest.approx([0.0, 0.0, 1.0])
+    assert report.spin == pytest.approx([0.0, 2.0, 0.0], abs=1e-6)
+    for arguments, reason in (
+        ({"body": "bell"}, "argument 'position' is missing"),
+        ({"body": "rock", "position": ELSEWHERE}, "'rock' is unknown"),
+        ({"body": "bell", "position": [0.015, 0.015, 0.01]}, "overlaps grains"),
+    ):
+        good, told = put(**arguments)
+        assert not good
+        assert reason in told
 
 
 def test_velocities_tell_no_place_to_begin(ros, start_node):
