@@ -168,12 +168,15 @@ def test_ten_megabytes_of_frame_name(client, start_node):
 
 @pytest.mark.parametrize("examples", [60, pytest.param(1_000, marks=pytest.mark.slow)])
 def test_any_argument_of_a_service(client, start_node, tmp_path, examples):
-    node = start_node(pacing="lockstep", points_rate=0.0, states=str(tmp_path / "states"))
+    rock = {"spheres": [[0.0, 0.0, 0.0, 0.01]], "material": "sand", "pose": {"position": [0.1, 0.1, 0.01]}}
+    node = start_node({"bodies": {"sand": rock}}, pacing="lockstep", points_rate=0.0, states=str(tmp_path / "states"))
     client.connect()
     names = {
         "spawn_grains": ["position", "radius", "material", "velocity"],
         "remove_grains": ["id", "low", "high"],
         "set_tool_mesh": ["tool", "mesh", "scale"],
+        "place_tool": ["tool", "position", "orientation"],
+        "place_body": ["body", "position", "orientation", "velocity", "spin"],
         "load_state": ["name"],
     }
     text = st.one_of(
