@@ -10,6 +10,7 @@ from sampler.body import Evenness, ParticleBody
 from sampler.errors import MeshError
 from sampler.geometry.surface import Surface
 from sampler.geometry.vectors import extremes
+from sampler.launching import load_kernels
 from sampler.limits import MOST, broken_limits, check_scale, check_thickness, too_many, unevenness
 from sampler.mass import count_inside, integrate, is_physical, joined, openness
 from sampler.measuring import measure_evenness
@@ -77,7 +78,8 @@ def sample_body(
     """
     lengths = {"radius": radius, "spacing": spacing, "smallest grain": grain, "sheet thickness": thickness}
     check_options(lengths, count, seed, device)
-    progress(0.0)  # mending, and cutting parts that cross, may take a while
+    progress(0.0)  # compiling, mending, and cutting parts that cross may take a while
+    load_kernels(device, partial(progress, 0.0))
     repaired = mesh if isinstance(mesh, RepairedMesh) else repair_mesh(mesh, sheets)
     thickness = 2.0 * radius if thickness is None else thickness
     if np.any(repaired.kind == SHEET):

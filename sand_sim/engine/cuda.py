@@ -10,11 +10,12 @@ of the energy that they have carried off.
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import warp as wp
 
+from sampler.compiling import compile_modules
 from sampler.cores import available_cores
-from sand_sim.engine.compiling import compile_kernels
 from sand_sim.engine.count import Count
 from sand_sim.engine.kernel import fill_gaps
 from sand_sim.engine.lanes import RECORDING
@@ -107,7 +108,9 @@ class CudaDevice:
 
     def load(self, kernels: list[wp.Kernel], progress: Callable[[str, float], None]) -> None:
         """Compile what is not in Warp's cache, on several threads, and load it all; nothing can be loaded while recording."""
-        compile_kernels(kernels, self.name, available_cores(), progress, block_dim=_BLOCK)
+        modules = dict.fromkeys(kernel.module for kernel in kernels)
+        told = partial(progress, "compiling kernels")
+        compile_modules(modules, self.name, available_cores(), told, block_dim=_BLOCK)
 
     def record(self, program: Callable[[CudaRecorder], None], steps: wp.array | None = None) -> Callable[[], None]:
         """Record a program as one graph.

@@ -11,11 +11,12 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from functools import partial
 
 import warp as wp
 
+from sampler.compiling import compile_modules
 from sampler.cores import available_cores
-from sand_sim.engine.compiling import compile_kernels
 from sand_sim.engine.count import Count
 from sand_sim.engine.crew import Crew
 from sand_sim.engine.kernel import fill_gaps, kernel
@@ -148,7 +149,8 @@ class CpuDevice:
 
     def load(self, kernels: list[wp.Kernel], progress: Callable[[str, float], None]) -> None:
         """Compile what is not in Warp's cache, on several threads, and load it all."""
-        compile_kernels(kernels, "cpu", available_cores(), progress)
+        modules = dict.fromkeys(kernel.module for kernel in kernels)
+        compile_modules(modules, "cpu", available_cores(), partial(progress, "compiling kernels"))
 
     def record(self, program: Callable[[LaneRecorder], None], steps: wp.array | None = None) -> Callable[[], None]:
         """Record a program once per thread.

@@ -1,11 +1,14 @@
 """Kernels in shares, one on each core at a time."""
 
 import os
+import re
 import threading
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+import sampler.sampling  # which declares all kernels
 from sampler import cores, launching
 
 
@@ -44,3 +47,30 @@ def test_cores_are_counted_where_a_process_may_use_all(tmp_path, monkeypatch):
     monkeypatch.delattr(os, "sched_getaffinity")
     monkeypatch.setattr(os, "cpu_count", lambda: 6)
     assert cores.available_cores() == 6
+
+
+def test_kernels_that_all_bodies_need_are_made_ready_together(monkeypatch):
+    """All there are but those for cracks; once for a device, and not at all if that is given up."""
+    sources = Path(sampler.__file__).parent.rglob("*.py")
+    declared = {name for path in sources for name in re.findall(r'(?:module|MODULE) ?= ?"sampler_(\w+)"', path.read_text())}
+    assert declared == {*launching._MODULES, "welding"}
+    made = []
+    monkeypatch.setattr(launching, "compile_modules", lambda modules, device, *_: made.append((modules, device)))
+    monkeypatch.setattr(launching, "_loaded", set())
+    for device in ("cpu", "cpu", "cuda"):
+        launching.load_kernels(device, lambda: None)
+    assert [device for _, device in made] == ["cpu", "cuda"]
+    assert {module.name for module in made[0][0]} == {f"sampler_{name}" for name in launching._MODULES}
+
+
+def test_making_kernels_ready_can_be_given_up(monkeypatch):
+    monkeypatch.setattr(launching, "_loaded", set())
+
+    def give_up():
+        raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        launching.load_kernels("cpu", give_up)
+    assert not launching._loaded
+    launching.load_kernels("cpu", lambda: None)
+    assert launching._loaded == {"cpu"}
