@@ -1,6 +1,6 @@
 """A free rigid body put somewhere else at once, between two steps."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,17 +11,18 @@ from sand_sim.changes.carrying_over import rebuild
 from sand_sim.changes.clearance import find_obstacles
 from sand_sim.changes.exchange import FASTEST
 from sand_sim.engine.reviving import revive
-from sand_sim.grain_table import BodyTable, GrainTable
+from sand_sim.grain_table import GrainTable
 from sand_sim.readout.observing import observe_bodies, observe_grains
 from sand_sim.scene.stable_step import DEEP
 from sand_sim.scene.types import Body, Pose
 
 
-def read_body(assembly: Assembly, name: str, position, orientation, velocity, spin) -> GrainTable:
+def read_body(assembly: Assembly, spheres: GrainCloud, name: str, position, orientation, velocity, spin) -> GrainTable:
     """A body and its spheres as they shall be.
 
     Args:
         assembly: the world's, measured.
+        spheres: from ``observe_spheres``.
         name: of the body.
         position: of its own frame's origin, shape (3,) [m].
         orientation: of its own frame, shape (4,).
@@ -34,7 +35,7 @@ def read_body(assembly: Assembly, name: str, position, orientation, velocity, sp
     models, label = {model.body.name: model for model in assembly.bodies}, f"body '{name}'"
     if name not in models:
         raise CommandError("unknown_body", f"{label} is unknown; known are {', '.join(models) or 'none'}")
-    seen = {report.name: report for report in observe_bodies(assembly, observe_grains(assembly))}
+    seen = {report.name: report for report in observe_bodies(assembly, observe_grains(assembly, spheres))}
     here = seen.get(name) or _as_in_scene(models[name].body)
     asked = {"position": (position, 3), "orientation": (orientation, 4), "velocity": (velocity, 3), "spin": (spin, 3)}
     position, orientation, velocity, spin = (
@@ -76,13 +77,9 @@ def put_body(assembly: Assembly, name: str, rows: GrainTable, spheres: GrainClou
     if blocked := find_obstacles(assembly, rest, poses, rows.position, (1.0 - DEEP) * rows.radius, of_body=name):
         raise CommandError("blocked", f"body '{name}' has no room there: it overlaps {', '.join(blocked)}; put it elsewhere")
     table, own = assembly.table, np.flatnonzero(assembly.grain_of_sphere == number)
-    body = table.body[own[:1]]
-    bodies = {
-        field.name: _with(getattr(table.bodies, field.name), body, getattr(rows.bodies, field.name))
-        for field in fields(BodyTable)
-    }
-    columns = {field: _with(getattr(table, field), own, getattr(rows, field)) for field in ("position", "velocity", "spin")}
-    begun = rebuild(assembly, replace(table, **columns, bodies=BodyTable(**bodies)), assembly.tools)
+    bodies = _with(table.bodies, table.body[own[:1]], rows.bodies, ("position", "orientation", "velocity", "spin"))
+    moved = _with(replace(table, bodies=bodies), own, rows, ("position", "velocity", "spin"))
+    begun = rebuild(assembly, moved, assembly.tools)
     assembly.solver.remove(own)
     assembly.solver.renew_lists()
     revive(assembly.solver, begun.solver.take_state(), own)
@@ -104,7 +101,9 @@ def _numbers(label: str, values, number: int) -> np.ndarray:
     return values
 
 
-def _with(column: np.ndarray, rows, values: np.ndarray) -> np.ndarray:
-    changed = column.copy()
-    changed[rows] = values
-    return changed
+def _with(table, at: np.ndarray, rows, names: tuple[str, ...]):
+    """A table that has some columns of other rows in the place of its own."""
+    columns = {name: getattr(table, name).copy() for name in names}
+    for name, column in columns.items():
+        column[at] = getattr(rows, name)
+    return replace(table, **columns)

@@ -130,8 +130,9 @@ class Changeable:
                 nothing is changed then.
         """
         self._health()
-        rows = read_body(self.assembly, body, position, orientation, velocity, spin)
-        put_body(self.assembly, body, rows, observe_spheres(self.assembly), self._poses)
+        spheres = observe_spheres(self.assembly)
+        rows = read_body(self.assembly, spheres, body, position, orientation, velocity, spin)
+        put_body(self.assembly, body, rows, spheres, self._poses)
         self._go_on_with(self.assembly)
 
     def _go_on_with(self, assembly: Assembly) -> None:

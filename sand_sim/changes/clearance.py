@@ -37,10 +37,8 @@ def find_obstacles(
     """
     spare = _TOUCH * radius + 2.0 * assembly.lattice.quantum
     grains = (one for one, _ in overlapping(position, radius - spare, spheres.position, spheres.radius.astype(float)))
-    each_other = iter(())
-    if not of_body:
-        pairs = overlapping(position, radius - 0.5 * spare, position, radius - 0.5 * spare)
-        each_other = (one[one != other] for one, other in pairs)
+    pairs = () if of_body else overlapping(position, radius - 0.5 * spare, position, radius - 0.5 * spare)
+    each_other = (one[one != other] for one, other in pairs)
     try:
         blocked = {"grains": _gather(grains), "one another": _gather(each_other)}
     except TooManyPairsError as error:

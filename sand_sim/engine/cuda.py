@@ -108,8 +108,7 @@ class CudaDevice:
 
     def load(self, kernels: list[wp.Kernel], progress: Callable[[str, float], None]) -> None:
         """Compile what is not in Warp's cache, on several threads, and load it all; nothing can be loaded while recording."""
-        modules = dict.fromkeys(kernel.module for kernel in kernels)
-        told = partial(progress, "compiling kernels")
+        modules, told = (kernel.module for kernel in kernels), partial(progress, "compiling kernels")
         compile_modules(modules, self.name, available_cores(), told, block_dim=_BLOCK)
 
     def record(self, program: Callable[[CudaRecorder], None], steps: wp.array | None = None) -> Callable[[], None]:

@@ -149,8 +149,8 @@ class CpuDevice:
 
     def load(self, kernels: list[wp.Kernel], progress: Callable[[str, float], None]) -> None:
         """Compile what is not in Warp's cache, on several threads, and load it all."""
-        modules = dict.fromkeys(kernel.module for kernel in kernels)
-        compile_modules(modules, "cpu", available_cores(), partial(progress, "compiling kernels"))
+        modules, told = (kernel.module for kernel in kernels), partial(progress, "compiling kernels")
+        compile_modules(modules, "cpu", available_cores(), told)
 
     def record(self, program: Callable[[LaneRecorder], None], steps: wp.array | None = None) -> Callable[[], None]:
         """Record a program once per thread.

@@ -11,12 +11,11 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 
 pytestmark = pytest.mark.xdist_group("processes")
 
-from node_client import PATIENCE, START, Client, drive
+from node_client import PATIENCE, START, Client, ask, drive
 from processes import kill
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.parameter import Parameter
 from scenes import write_small_scene
 from std_srvs.srv import Trigger
 
@@ -24,13 +23,6 @@ from msg_adapters.builtin_interfaces import stamp_to_time
 from msg_adapters.geometry_msgs import wrench_to_arrays
 from msg_adapters.sensor_msgs import cloud_to_points
 from sand_sim import load_scene
-
-
-def ask(client, name, /, **arguments):
-    parameters = [Parameter(argument, value=value).to_parameter_msg() for argument, value in arguments.items()]
-    request = SetParametersAtomically.Request(parameters=parameters)
-    result = client.call(SetParametersAtomically, name, request).result
-    return result.successful, result.reason
 
 
 def position_of(client, node):

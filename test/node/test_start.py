@@ -10,18 +10,10 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 pytestmark = pytest.mark.xdist_group("processes")
 
 from geometry_msgs.msg import PoseStamped
-from node_client import START
-from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.parameter import Parameter
+from node_client import START, ask
 from std_srvs.srv import Trigger
 
 ELSEWHERE = [0.1, -0.1, 0.2]
-
-
-def ask(client, name, **arguments):
-    parameters = [Parameter(key, value=value).to_parameter_msg() for key, value in arguments.items()]
-    result = client.call(SetParametersAtomically, name, SetParametersAtomically.Request(parameters=parameters)).result
-    return result.successful, result.reason
 
 
 @pytest.fixture

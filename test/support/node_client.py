@@ -6,7 +6,9 @@ import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
 
@@ -71,6 +73,14 @@ class Client:
     def close(self):
         self.executor.shutdown()  # it holds on to what it waits for
         self.node.destroy_node()
+
+
+def ask(client, name, /, **arguments):
+    """Ask for a change of the world by its service; whether it was made, and what was said."""
+    parameters = [Parameter(argument, value=value).to_parameter_msg() for argument, value in arguments.items()]
+    request = SetParametersAtomically.Request(parameters=parameters)
+    result = client.call(SetParametersAtomically, name, request).result
+    return result.successful, result.reason
 
 
 def drive(client, scene, begin=0.0, end=None):
