@@ -1,4 +1,4 @@
-"""What must hold on a GPU. Where there is none the tests of the stand-in show at least that the tests are sound."""
+"""What must hold on a GPU."""
 
 from dataclasses import replace
 
@@ -6,23 +6,17 @@ import numpy as np
 import pytest
 import warp as wp
 from kinds import KINDS, flying_grains
-from many_threads import ManyThreads
 from scenes import floor, record, write_small_scene
 
 from sand_sim import ToolPose, World, load_scene
-from sand_sim.engine.device import open_device
 
-GPU = pytest.mark.skipif(not wp.is_cuda_available(), reason="needs an NVIDIA GPU")
+pytestmark = pytest.mark.skipif(not wp.is_cuda_available(), reason="needs an NVIDIA GPU; test_paper_gpu.py runs these without")
 
 
-@pytest.fixture(params=["stand-in", pytest.param("cuda", marks=GPU)])
-def device(request, monkeypatch):
-    """Scenes with this ``solver.device`` run on a GPU, or on its stand-in, which has all arrays that it works on."""
+@pytest.fixture
+def device(monkeypatch):
+    """Scenes with this ``solver.device`` run on a GPU, which has all arrays that it works on."""
     monkeypatch.setattr(wp.config, "launch_array_access_mode", wp.config.LaunchArrayAccessMode.STRICT)
-    if request.param == "stand-in":
-        stand_in = ManyThreads(threads=500, shares=64)
-        choose = lambda name, threads: stand_in if name == "cuda" else open_device(name, threads)  # noqa: E731
-        monkeypatch.setattr("sand_sim.assembly.assemble.open_device", choose)
     return "cuda"
 
 
