@@ -169,9 +169,7 @@ class EntryPoints:
             return create(points, velocities, indices, vertices, triangles, winding, constructor, *rest)
 
     def mesh_destroy_device(self, mesh):
-        self._gpu.wait()
-        with self._gpu.memory.opened():
-            self._library.wp_mesh_destroy_host(mesh)
+        self._gpu.clean_up(lambda: self._library.wp_mesh_destroy_host(mesh))
 
     # kernels
 

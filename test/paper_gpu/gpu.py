@@ -122,6 +122,11 @@ class Gpu:
         with self._lock:
             (self._graph if self.capturing else self._queue).append(work)
 
+    def clean_up(self, work: Work) -> None:
+        """Ask for what is no part of a graph even if one is captured: Python collects garbage when it likes, also in ``wait``."""
+        with self._lock:
+            self._queue.append(work)
+
     def wait(self) -> None:
         """Do all that was asked for."""
         self.forbid_while_capturing("waiting")
@@ -139,18 +144,18 @@ class Gpu:
         self.forbid_while_capturing("memory is asked for")
         with self._lock:
             place = self.memory.take(size)
-            self._queue.append(lambda: ctypes.memset(place, _FRESH, size))
-            return place
+        self.clean_up(lambda: ctypes.memset(place, _FRESH, size))
+        return place
 
     def give_back(self, place: int) -> None:
         with self._lock:
             size = self.memory.give_back(place)
 
-            def free():
-                ctypes.memset(place, _FREED, size)
-                self.memory.recycle(place, size)
+        def free():
+            ctypes.memset(place, _FREED, size)
+            self.memory.recycle(place, size)
 
-            self._queue.append(free)
+        self.clean_up(free)
 
     def launch(self, name: str, kernel: Callable, arguments: list[bytes], blocks: int, threads: int) -> None:
         """Ask for a launch of a kernel of ``ptx.Program``; arguments are copied now, as by a GPU."""
