@@ -294,8 +294,8 @@ def fall_height(scene: Scene, table: GrainTable, walls: list[Wall], grounds: lis
         if wall.kind == "plane" and steepness > _FLOOR:
             heights.append(float((wall.distance(table.position) - table.radius).max()) / steepness)
     highest = float((table.position @ down).min())
-    boxes = [wall.corners for wall in walls if wall.kind == "shell"] + [ground.mesh.bounds + ground.place for ground in grounds]
-    heights += [float(np.maximum(*(box * down)).sum()) - highest for box in boxes]
+    boxes = [wall.corners for wall in walls] + [ground.mesh.bounds + ground.place for ground in grounds]
+    heights += [float(np.maximum(*(box * down)).sum()) - highest for box in boxes if box is not None]
     return max(heights)
 
 

@@ -57,7 +57,7 @@ def _lattice(
         poses = [tool.tool.pose, *(waypoint.pose for waypoint in tool.tool.trajectory)]
         stops = np.array([pose.position for pose in poses])
         corners += [stops - tool.extent, stops + tool.extent]
-    corners += [wall.corners for wall in walls if wall.kind == "shell"]
+    corners += [wall.corners for wall in walls if wall.corners is not None]
     corners += [ground.mesh.bounds + ground.place for ground in grounds]
     corners = np.concatenate(corners)
     low, high = corners.min(axis=0), corners.max(axis=0)

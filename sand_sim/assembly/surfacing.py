@@ -6,10 +6,10 @@ import numpy as np
 
 from sand_sim.engine.lattice import Lattice
 from sand_sim.engine.plungers import Plunger
-from sand_sim.engine.recipe import CYLINDER, PLANE, PLUNGER, ROUGH, SHELL
+from sand_sim.engine.recipe import CYLINDER, PANEL, PLANE, PLUNGER, ROUGH, SHELL
 from sand_sim.engine.surfaces import BOTH_SIDES, KINDS, NEAR_SIDE, NO_SIDE, Surface
 from sand_sim.scene.types import SceneError
-from sand_sim.scene.walls import Wall
+from sand_sim.scene.walls import Wall, across
 
 _MOST_NUMBERS = 2**31 - 1
 _SAME = 1e-6  # of a radius: rings nearer than that are one
@@ -51,13 +51,16 @@ def make_surfaces(
         surface.first = numbers
         surface.anchor = np.rint((wall.point - lattice.centre) / lattice.quantum)
         surface.direction = wall.direction
-        surface.across = _across(wall.direction)
+        surface.across = across(wall.direction)
         if wall.kind == CYLINDER:
             surface.begin = surface.end = np.array([wall.radius, 0.0]) / lattice.quantum
         if wall.kind == SHELL:
             surface.begin, surface.end = wall.begin / lattice.quantum, wall.end / lattice.quantum
             surface.beyond_begin, surface.answers_begin = _joint(walls, index, at_begin=True)
             surface.beyond_end, surface.answers_end = _joint(walls, index, at_begin=False)
+        if wall.kind == PANEL:
+            surface.begin, surface.end = wall.begin / lattice.quantum, wall.end / lattice.quantum
+            surface.joined, surface.answers = wall.joined, wall.answers
         taken = 2 if wall.kind == SHELL else 1  # its sides
         if wall.rough:
             _check_gaps(wall, smallest)
@@ -94,13 +97,6 @@ def make_plungers(walls: list[Wall], mass: float) -> list[Plunger]:
         one.max_speed, one.travel = drive.max_speed, min(drive.travel, 1e30)
         plungers.append(one)
     return plungers
-
-
-def _across(direction: np.ndarray) -> np.ndarray:
-    """Unit vector at right angles to a direction, as near as can be to the coordinate axis that is farthest from it."""
-    axis = np.eye(3)[np.argmin(np.abs(direction))]
-    across = axis - (axis @ direction) * direction
-    return across / np.linalg.norm(across)
 
 
 def _joint(walls: list[Wall], index: int, at_begin: bool) -> tuple[np.ndarray, int]:
@@ -151,10 +147,10 @@ def _lay_spheres(surface: Surface, wall: Wall, lattice: Lattice) -> int:
         middle, half = -float(surface.anchor @ axis), float(reach @ np.abs(axis))
         return floor((middle - half) / step) - 2, ceil((middle + half) / step) + 2
 
-    direction, across = np.asarray(wall.direction), _across(wall.direction)
+    direction, aside = np.asarray(wall.direction), across(wall.direction)
     if wall.kind == PLANE:
-        surface.first_column, last_column = span(across, spacing)
-        first_row, last_row = span(np.cross(direction, across), row_spacing)
+        surface.first_column, last_column = span(aside, spacing)
+        first_row, last_row = span(np.cross(direction, aside), row_spacing)
         first_row -= first_row % 2
         surface.first_row, surface.columns = first_row, last_column - surface.first_column + 1
         surface.rows = last_row - first_row + 1

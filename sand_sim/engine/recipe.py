@@ -6,7 +6,8 @@ from sand_sim.contact.model import ContactModel
 from sand_sim.integrator import VERLET
 from sand_sim.precision import SINGLE, Precision
 
-PLANE, CYLINDER, SHELL, ROUGH, PLUNGER = "plane", "cylinder", "shell", "rough", "plunger"
+PLANE, CYLINDER, SHELL, PANEL = "plane", "cylinder", "shell", "panel"
+ROUGH, PLUNGER = "rough", "plunger"
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class Recipe:
         bodies: some grains are rigid bodies of several spheres.
         integrator: one of ``integrator.INTEGRATORS``.
         smooth_tools: grains touch the true surfaces of some tools, not their particles.
-        surfaces: what walls there are: ``plane``, ``cylinder``, ``shell``; and whether some are ``rough`` or a ``plunger``.
+        surfaces: kinds of walls: ``plane``, ``cylinder``, ``shell``, ``panel``; and whether some are ``rough`` or a ``plunger``.
         carry: steps are so short that what rounding takes off velocities must be carried over to the next step.
     """
 

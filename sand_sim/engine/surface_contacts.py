@@ -11,7 +11,7 @@ from sand_sim.engine.contact_list import build_note
 from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.plungers import PlungerState
 from sand_sim.engine.prefetch import build_fetch_grain
-from sand_sim.engine.recipe import CYLINDER, PLUNGER, ROUGH, SHELL, Recipe
+from sand_sim.engine.recipe import CYLINDER, PANEL, PLUNGER, ROUGH, SHELL, Recipe
 from sand_sim.engine.roughness import build_columns_near, build_rows_near, build_sphere_at
 from sand_sim.engine.surfaces import KINDS, Surface, build_nearest, build_surface_of
 from sand_sim.precision import Precision
@@ -141,7 +141,7 @@ def build_surface_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
     meeting, acts = build_meeting(precision), build_acts(recipe)
     drifting, springs, halves = build_drifting(precision), recipe.springs, recipe.halves
     act, release, fetch_grain = *build_act(recipe, measuring), build_fetch_grain(recipe)
-    rough, moving, curved = ROUGH in surfaces, PLUNGER in surfaces, bool(surfaces & {CYLINDER, SHELL})
+    rough, moving, curved = ROUGH in surfaces, PLUNGER in surfaces, bool(surfaces & {CYLINDER, SHELL, PANEL})
 
     @kernel
     def surface_forces(

@@ -8,9 +8,9 @@ from functools import cache
 
 import warp as wp
 
-from sand_sim.engine.recipe import CYLINDER, PLANE, ROUGH, SHELL, Recipe
+from sand_sim.engine.recipe import CYLINDER, PANEL, PLANE, ROUGH, SHELL, Recipe
 
-KINDS = {PLANE: 0, CYLINDER: 1, SHELL: 2}
+KINDS = {PLANE: 0, CYLINDER: 1, SHELL: 2, PANEL: 3}
 NO_SIDE, NEAR_SIDE, BOTH_SIDES = 0, 1, 2  # how many sides of a shell answer at an end of its line
 _FAR = 1.0e18  # [quantum] where there is nothing to touch
 
@@ -21,6 +21,10 @@ class Surface:
 
     A shell is a line in the half plane of distance from the axis and height along it, turned about the axis; it is thin and solid
     both ways. Where the lines of two shells meet, only one of them answers at the common point, so that a seam is no rim.
+
+    A panel is a rectangle, thin and solid both ways, its edges numbered by bits as in ``scene.walls``. Where another panel stands
+    on an edge, on the side of the normal, that is no rim either: before the other's face it does not answer, and outside of the
+    corner that of one of the two does.
     """
 
     kind: int
@@ -29,14 +33,16 @@ class Surface:
     ease: wp.float64  # [1/kg] one over the mass that is moved by a force, zero if nothing moves it or at a velocity
     first: int  # its contacts are listed under partner numbers from here on
     anchor: wp.vec3d  # [quantum] a point of the plane, or height zero on the axis
-    direction: wp.vec3d  # [1] the plane's normal towards the grains, or the axis
+    direction: wp.vec3d  # [1] the plane's normal towards the grains, the panel's, or the axis
     across: wp.vec3d  # [1] a unit vector at right angles to it
-    begin: wp.vec2d  # [quantum] of the line: distance from the axis, height
+    begin: wp.vec2d  # [quantum] of the line: distance from the axis, height; of the panel: along ``across``, and across both
     end: wp.vec2d  # [quantum]
     beyond_begin: wp.vec2d  # [1] way of the line that goes on there, zero at a free rim
     beyond_end: wp.vec2d  # [1]
     answers_begin: int
     answers_end: int
+    joined: int  # edges of the panel that another one stands on
+    answers: int  # those of them at which this one answers
     ball: wp.float64  # [quantum] radius of the virtual spheres, zero if smooth
     spacing: wp.float64  # [quantum] of virtual spheres in a row, at most
     row_spacing: wp.float64  # [quantum]
@@ -93,12 +99,44 @@ def build_nearest_on_shell(listing: bool = False) -> wp.Function:
 
 
 @cache
+def build_nearest_on_panel(listing: bool = False) -> wp.Function:
+    """Warp function ``(wall, away) -> (distance [quantum], normal)`` for a panel; ``listing`` as of shells."""
+    zero, far = wp.float64(0.0), wp.float64(_FAR)
+
+    @wp.func
+    def nearest_on_panel(wall: Surface, away: wp.vec3d):
+        beside = wp.cross(wall.direction, wall.across)
+        here = wp.vec2d(wp.dot(away, wall.across), wp.dot(away, beside))
+        height = wp.dot(away, wall.direction)
+        beyond = here - wp.min(wp.max(here, wall.begin), wall.end)
+        apart = wall.direction * height + wall.across * beyond[0] + beside * beyond[1]
+        distance = wp.length(apart)
+        normal = wall.direction
+        if distance > zero:
+            normal = apart / distance
+        if wp.static(not listing):
+            edges = int(0)
+            for axis in range(2):
+                if beyond[axis] < zero:
+                    edges |= 1 << (2 * axis)
+                elif beyond[axis] > zero:
+                    edges |= 2 << (2 * axis)
+            edges &= wall.joined
+            if edges != 0 and (height > zero or (edges & ~wall.answers) != 0):
+                distance = far
+        return distance, normal
+
+    return nearest_on_panel
+
+
+@cache
 def build_nearest(surfaces: frozenset[str], listing: bool = False) -> wp.Function:
     """Warp function ``(wall, side, away) -> (distance [quantum], normal)`` for the smooth surfaces of a recipe.
 
     ``away`` is from the anchor to the grain's centre [quantum]; only shells have a side 1. For ``listing`` see the shells.
     """
-    cylinder, shell, nearest_on_shell = CYLINDER in surfaces, SHELL in surfaces, build_nearest_on_shell(listing)
+    cylinder, shell, panel = CYLINDER in surfaces, SHELL in surfaces, PANEL in surfaces
+    nearest_on_shell, nearest_on_panel = build_nearest_on_shell(listing), build_nearest_on_panel(listing)
 
     @wp.func
     def nearest(wall: Surface, side: int, away: wp.vec3d):
@@ -115,6 +153,9 @@ def build_nearest(surfaces: frozenset[str], listing: bool = False) -> wp.Functio
         if wp.static(shell):
             if wall.kind == wp.static(KINDS[SHELL]):
                 distance, normal = nearest_on_shell(wall, side, away)
+        if wp.static(panel):
+            if wall.kind == wp.static(KINDS[PANEL]):
+                distance, normal = nearest_on_panel(wall, away)
         return distance, normal
 
     return nearest

@@ -14,6 +14,7 @@ _COMMON = ("type", "material", "name")
 _NEEDED = {
     "plane": ("point", "normal"),
     "box": ("low", "high"),
+    "bin": ("low", "high"),
     "cylinder": ("point", "axis", "radius"),
     "cone": ("point", "axis", "hole_radius", "radius"),
     "hole_plate": ("point", "normal", "hole_radius", "radius"),
@@ -23,6 +24,7 @@ _NEEDED = {
 _OPTIONAL = {
     "plane": ("rough",),
     "box": ("open", "rough"),
+    "bin": ("open",),
     "cylinder": ("height", "rough", "grains"),
     "cone": ("height", "angle", "rough", "grains"),
     "hole_plate": ("rough",),
@@ -54,9 +56,10 @@ def read_boundary(entry: Field, folder: Path) -> Boundary:
     }
     if kind == "terrain":
         return Boundary(**common, terrain=_terrain(entry, folder))
-    if kind == "box":
+    if kind in ("box", "bin"):
         low, high = read_corners(Field({"low": entry.value["low"], "high": entry.value["high"]}, entry.path))
-        sides = tuple(side.choice(_SIDES) for side in entry["open"].entries()) if "open" in entry else ()
+        usual = ("top",) if kind == "bin" else ()
+        sides = tuple(side.choice(_SIDES) for side in entry["open"].entries()) if "open" in entry else usual
         return Boundary(**common, low=low, high=high, open_sides=sides)
     common["point"] = entry["point"].vector()
     common["direction"] = entry["axis" if "axis" in entry else "normal"].direction()

@@ -1,4 +1,4 @@
-"""Boundaries of a scene taken apart into planes, cylinders and surfaces of revolution, with their distances on the host."""
+"""Boundaries of a scene taken apart into planes, rectangles, cylinders and surfaces of revolution, with distances on the host."""
 
 from dataclasses import dataclass
 
@@ -21,13 +21,16 @@ class Wall:
     """One analytic surface.
 
     Attributes:
-        kind: ``plane``, ``cylinder`` (without end, grains inside) or ``shell``, a line turned about an axis.
+        kind: ``plane``, ``cylinder`` (without end, grains inside), ``shell`` (line turned about an axis), ``panel`` (rectangle).
         name: of the boundary, with the side of a box.
         material: name.
-        point: of the plane or on the axis, shape (3,) [m].
-        direction: plane normal towards the grains or axis, unit, shape (3,).
+        point: of the plane, a corner of the panel or on the axis, shape (3,) [m].
+        direction: plane normal towards the grains, panel normal into its bin, or axis, unit, shape (3,).
         radius: of the cylinder [m].
-        begin, end: of the shell's line, distance from the axis and height above ``point``, shape (2,) [m].
+        begin, end: of the shell's line, distance from the axis and height above ``point``; of the panel, from ``point`` along
+            ``across(direction)`` and along the cross product of ``direction`` with that; shape (2,) [m].
+        joined: edges of the panel that another one stands on: 1 and 2 at begin and end along the first, 4 and 8 along the second.
+        answers: those of them at which it is this one that grains outside of the corner touch.
         rough: its virtual spheres.
         drive: how it moves along ``direction``.
         around: whether fills put grains around a shell, not into it.
@@ -41,6 +44,8 @@ class Wall:
     radius: float = 0.0
     begin: np.ndarray | None = None
     end: np.ndarray | None = None
+    joined: int = 0
+    answers: int = 0
     rough: Rough | None = None
     drive: Drive | None = None
     around: bool = False
@@ -53,13 +58,17 @@ class Wall:
     def gap(self, position: np.ndarray) -> np.ndarray:
         """Distance of points, shape (n, 3) [m], from the surface, shape (n,) [m].
 
-        It is negative behind planes and outside of cylinders without end, which push to one side only. Shells push to both.
+        It is negative behind planes and outside of cylinders without end, which push to one side only. Others push to both.
         """
         away = position - self.point
         along = away @ self.direction
         thickness = self.rough.radius if self.rough else 0.0
         if self.kind == "plane":
             return along - thickness
+        if self.kind == "panel":
+            here = away @ self._sides.T
+            beyond = here - np.clip(here, self.begin, self.end)
+            return np.linalg.norm(np.column_stack([along, beyond]), axis=1)
         from_axis = np.linalg.norm(away - along[:, None] * self.direction, axis=1)
         if self.kind == "cylinder":
             return self.radius - from_axis - thickness
@@ -81,18 +90,36 @@ class Wall:
         return np.where((level > 0.0) & (level < 1.0) & (outside != self.around), -np.abs(gap), gap)
 
     @property
-    def corners(self) -> np.ndarray:
-        """Box around a shell, shape (2, 3) [m]."""
+    def corners(self) -> np.ndarray | None:
+        """Box around a shell or panel, shape (2, 3) [m]; None for what has no end."""
+        if self.kind == "panel":
+            ends = self.point + np.array([self.begin, self.end]) @ self._sides
+            return np.array([ends.min(axis=0), ends.max(axis=0)])
+        if self.kind != "shell":
+            return None
         middles = self.point + np.array([self.begin[1], self.end[1]])[:, None] * self.direction
         reach = max(self.begin[0], self.end[0]) * np.sqrt(1.0 - np.minimum(self.direction**2, 1.0))
         return np.array([middles.min(axis=0) - reach, middles.max(axis=0) + reach])
 
+    @property
+    def _sides(self) -> np.ndarray:
+        """Unit vectors along the sides of a panel, which are parallel to the coordinate axes, shape (2, 3)."""
+        first = across(self.direction)
+        return np.array([first, np.cross(self.direction, first)])
+
+
+def across(direction: np.ndarray) -> np.ndarray:
+    """Unit vector at right angles to a direction, as near as can be to the coordinate axis that is farthest from it."""
+    axis = np.eye(3)[np.argmin(np.abs(direction))]
+    aside = axis - (axis @ direction) * direction
+    return aside / np.linalg.norm(aside)
+
 
 def walls_of(boundary: Boundary) -> list[Wall]:
-    """The analytic surfaces of a boundary; a box gives one plane for each closed side, a terrain none."""
+    """The analytic surfaces of a boundary; one for each closed side of a box or a bin, none for a terrain."""
     if boundary.kind == "terrain":
         return []
-    if boundary.kind == "box":
+    if boundary.kind in ("box", "bin"):
         return _sides(boundary)
     shape = {"kind": "shell"}
     if boundary.kind in ("plane", "plunger") and not boundary.radius:
@@ -108,12 +135,35 @@ def walls_of(boundary: Boundary) -> list[Wall]:
 
 
 def _sides(boundary: Boundary) -> list[Wall]:
+    closed = [side for side in _BOX_SIDES if side not in boundary.open_sides]
     walls = []
-    for side, (axis, lower) in _BOX_SIDES.items():
-        if side not in boundary.open_sides:
-            normal = np.zeros(3)
-            normal[axis] = 1.0 if lower else -1.0
-            point = np.asarray(boundary.low if lower else boundary.high, float)
-            name = f"{boundary.name}/{side}"
-            walls.append(Wall("plane", name, boundary.material, point, normal, rough=boundary.rough))
+    for side in closed:
+        axis, lower = _BOX_SIDES[side]
+        normal = np.zeros(3)
+        normal[axis] = 1.0 if lower else -1.0
+        point = np.asarray(boundary.low if lower else boundary.high, float)
+        place = {"name": f"{boundary.name}/{side}", "material": boundary.material, "point": point, "direction": normal}
+        if boundary.kind == "box":
+            walls.append(Wall("plane", **place, rough=boundary.rough))
+        else:
+            walls.append(Wall("panel", **place, **_edges(boundary, side, closed)))
     return walls
+
+
+def _edges(boundary: Boundary, side: str, closed: list[str]) -> dict:
+    """How far a side of a bin reaches, and which others stand on its edges; the first of two answers at the one they share."""
+    axis, lower = _BOX_SIDES[side]
+    normal = np.eye(3)[axis] * (1.0 if lower else -1.0)
+    first = across(normal)
+    begin, end, joined, answers = np.zeros(2), np.zeros(2), 0, 0
+    for k, along in enumerate((first, np.cross(normal, first))):
+        other = int(np.argmax(np.abs(along)))
+        size = boundary.high[other] - boundary.low[other]
+        forward = along[other] > 0.0  # along the axis, from the corner that the side is measured from
+        begin[k], end[k] = (0.0, size) if forward == lower else (-size, 0.0)
+        for bit, low in ((1, forward), (2, not forward)):
+            neighbour = next(name for name, (its_axis, its_lower) in _BOX_SIDES.items() if (its_axis, its_lower) == (other, low))
+            if neighbour in closed:
+                joined |= bit << 2 * k
+                answers |= (bit << 2 * k) * (closed.index(side) < closed.index(neighbour))
+    return {"begin": begin, "end": end, "joined": joined, "answers": answers}

@@ -131,7 +131,7 @@ def test_the_height_of_a_fill_is_that_above_its_region(low, high, fits):
             "contact.twisting: 'marshall' is the twist of Mindlin's",
         ),
         (("fills", 0, "region", "high"), [0.1, 0.1, -0.1], "fills[0].region: 'low'"),
-        (("boundaries", 0, "type"), "sphere", "boundaries[0].type: unknown 'sphere'; known are plane, box, cylinder"),
+        (("boundaries", 0, "type"), "sphere", "boundaries[0].type: unknown 'sphere'; known are plane, box, bin, cylinder"),
         (
             ("fills", 0, "radius"),
             {"normal": {"mean": 0.003, "deviation": 0.002}},
