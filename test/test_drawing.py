@@ -99,6 +99,17 @@ def test_a_figure_shows_the_end_of_a_run_that_goes_on_after_its_last_phase(tmp_p
     assert [name for name, _ in pick_views(log)] == views
 
 
+def test_a_figure_shows_where_bins_are_cut(tmp_path):
+    from sand_sim.sinks.figure import bin_sections
+
+    one = {"type": "bin", "material": "steel", "low": [0.0, -0.1, 0.0], "high": [0.3, 0.1, 0.2]}
+    scene = load_scene(write_small_scene(tmp_path, boundaries=[one]))
+    lines = {tuple(map(tuple, line[:, [0, 2]])) for line in bin_sections(scene, 0.05)}
+    assert lines == {((0.0, 0.0), (0.0, 0.2)), ((0.3, 0.0), (0.3, 0.2)), ((0.0, 0.0), (0.3, 0.0))}
+    assert all((line[:, 1] == 0.05).all() for line in bin_sections(scene, 0.05))
+    assert not bin_sections(scene, 0.15)
+
+
 def test_a_viewer_that_is_open_takes_the_views_of_the_run(tmp_path):
     """By the time they come it has views of its own, or those of another scene, and after a reset the time of the run before."""
     world, sent, times = World(load_scene(write_small_scene(tmp_path))), [], []

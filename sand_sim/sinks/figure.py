@@ -6,6 +6,8 @@ import numpy as np
 
 from sand_sim import rotation
 from sand_sim.assembly.tool_model import ToolModel
+from sand_sim.scene.types import Scene
+from sand_sim.scene.walls import walls_of
 from sand_sim.sinks.colours import colour_by_speed, fastest_shown
 from sand_sim.sinks.run_log import RunLog, View
 
@@ -37,7 +39,7 @@ def draw_run(log: RunLog, tools: list[ToolModel], path: Path) -> None:
     right.suptitle(f"grains by speed, from sand (at rest) to dark red ({fastest:g} m/s)", fontsize=9, x=0.02, ha="left")
     axes = np.atleast_1d(right.subplots(len(views), 1))
     for axis, (_, view) in zip(axes, views, strict=True):
-        _draw_view(axis, view, tools, fastest)
+        _draw_view(axis, view, tools, fastest, bin_sections(log.scene, _cut(view)))
     limits = np.array([[axis.get_xlim(), axis.get_ylim()] for axis in axes])
     low, high = limits[..., 0].min(axis=0), limits[..., 1].max(axis=0)
     for axis, (name, view) in zip(axes, views, strict=True):
@@ -56,6 +58,20 @@ def pick_views(log: RunLog) -> list[tuple[str, View]]:
     if not digging and (not views or views[-1][1].time < end.time):
         views.append(("end", end))
     return views[-_VIEWS:]
+
+
+def bin_sections(scene: Scene, cut: float) -> list[np.ndarray]:
+    """Where the plane at a place along y cuts the sides of bins: the ends of lines, shape (2, 3) [m]."""
+    lines = []
+    for wall in [wall for boundary in scene.boundaries for wall in walls_of(boundary)]:
+        if wall.kind == "panel" and wall.corners[0, 1] < cut < wall.corners[1, 1]:
+            lines.append(np.column_stack([wall.corners[:, 0], np.full(2, cut), wall.corners[:, 2]]))
+    return lines
+
+
+def _cut(view: View) -> float:
+    """Before which place along y nothing is drawn [m]."""
+    return view.tool_position[0, 1] if len(view.tool_position) else -np.inf
 
 
 def _draw_curves(figure, columns: dict[str, np.ndarray], log: RunLog) -> None:
@@ -89,11 +105,11 @@ def _project(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([x, z * np.cos(_TILT) + y * np.sin(_TILT)], -1), y * np.cos(_TILT) - z * np.sin(_TILT)
 
 
-def _draw_view(axis, view: View, tools: list[ToolModel], fastest: float) -> None:
-    """Grains and tool faces behind the plane through the first tool, far ones first."""
-    from matplotlib.collections import EllipseCollection, PolyCollection
+def _draw_view(axis, view: View, tools: list[ToolModel], fastest: float, walls: list[np.ndarray]) -> None:
+    """Grains and tool faces behind the plane through the first tool, far ones first, and before them where it cuts walls."""
+    from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
 
-    cut = view.tool_position[0, 1] if len(view.tool_position) else -np.inf
+    cut, sections = _cut(view), [_project(line)[0] for line in walls]
     shown = np.flatnonzero(view.position[:, 1] > cut - view.radius)
     spots, depth = _project(view.position[shown])
     colours = colour_by_speed(view.speed[shown], fastest) / 255.0
@@ -123,9 +139,10 @@ def _draw_view(axis, view: View, tools: list[ToolModel], fastest: float) -> None
             colour, outlines = face_colours[run], [faces[k][1] for k in run]
             axis.add_collection(PolyCollection(outlines, facecolors=colour, edgecolors=colour, linewidths=0.4))
         start = end
+    axis.add_collection(LineCollection(sections, colors="#6b7280", linewidths=1.5))
     if items:
         radius = view.radius[shown, None]
-        corners = np.concatenate([spots - radius, spots + radius, *(polygon for _, polygon in faces)])
+        corners = np.concatenate([spots - radius, spots + radius, *(polygon for _, polygon in faces), *sections])
         low, high = corners.min(axis=0), corners.max(axis=0)
         pad = 0.03 * float(np.max(high - low))
         axis.set_xlim(low[0] - pad, high[0] + pad)

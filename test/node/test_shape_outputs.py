@@ -38,6 +38,7 @@ def test_tools_and_boundaries_are_told_to_whoever_comes_and_anew_when_a_tool_has
         {**PLANE, "name": "side", "point": [-0.1, 0, 0], "normal": [1, 0, 0]},
         {**PLANE, "name": "far", "point": [0, 0, -7]},
         {"type": "box", "name": "bin", "material": "steel", "low": [-0.1, -0.1, 0], "high": [0.1, 0.15, 0.2], "open": ["top"]},
+        {"type": "bin", "name": "tray", "material": "steel", "low": [-0.1, 0.15, 0], "high": [0.1, 0.19, 0.05]},
         {"type": "cylinder", "name": "drum", "material": "steel", "point": [0, 0, 0], "axis": [0, 0, 1], "radius": 0.19},
         {
             "type": "terrain",
@@ -66,6 +67,7 @@ def test_tools_and_boundaries_are_told_to_whoever_comes_and_anew_when_a_tool_has
         ("boundaries/floor", 1): faces,
         ("boundaries/side", 0): lines,
         ("boundaries/bin", 0): lines,
+        ("boundaries/tray", 0): lines,
         ("boundaries/drum", 0): faces,
         ("boundaries/ground", 0): faces,
     }, "one outside of the domain is not drawn"
