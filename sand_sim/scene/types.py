@@ -120,10 +120,9 @@ class Terrain:
 class Boundary:
     """A wall.
 
-    ``plane`` (half space), ``box`` (grains inside, sides may be open), ``bin`` (a box whose
-    sides end at its edges, solid both ways), ``cylinder`` (grains inside if it has no end, solid both
-    ways if it has a height), ``cone`` and ``hole_plate`` (with a hole about the axis, solid both ways), ``plunger`` (a plane or
-    disc that moves along its normal) or ``terrain``.
+    ``plane`` (half space), ``box`` (grains inside, sides may be open), ``bin`` (a box whose sides end at its edges, solid both
+    ways), ``cylinder`` (grains inside if it has no end, solid both ways if it has a height), ``cone`` and ``hole_plate`` (with a
+    hole about the axis, solid both ways), ``plunger`` (a plane or disc that moves along its normal) or ``terrain``.
     """
 
     kind: str

@@ -14,9 +14,7 @@ KINDS = {
     "floor": {"boundaries": floor(-0.005), "gravity": [0.0, 0.0, -9.81]},
     "double": {"precision": "double"},
     "bin": {
-        "boundaries": [
-            {"type": "bin", "name": "bin", "material": "wall", "low": [-0.007] * 3, "high": [0.079, 0.079, 0.03]}
-        ],
+        "boundaries": [{"type": "bin", "name": "bin", "material": "wall", "low": [-0.007] * 3, "high": [0.079, 0.079, 0.03]}],
         "gravity": [0.0, 0.0, -9.81],
     },
     "plunger": {
