@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import warp as wp
 
+from paper_gpu import GPU
 from paper_gpu.gpu import PaperGpuError
 
 DEVICE = "cuda"
@@ -125,6 +126,16 @@ def test_what_cannot_be_captured_is_refused(forbidden):
     values = wp.zeros(1, dtype=float, device=DEVICE)
     with pytest.raises(PaperGpuError, match="captured"), wp.ScopedCapture(device=DEVICE, force_module_load=False):
         forbidden(values)
+
+
+def test_what_is_written_beside_an_array_is_seen():
+    values = wp.zeros(5, dtype=float, device=DEVICE)
+    longer = wp.array(ptr=values.ptr, dtype=float, shape=6, device=DEVICE)
+    wp.launch(double, dim=6, inputs=[longer], device=DEVICE)
+    with pytest.raises(PaperGpuError, match="behind the 20 bytes"):
+        wp.synchronize_device(DEVICE)
+    with GPU.memory.opened():
+        GPU.memory.mark(values.ptr, 20)  # so that tests to come find it in order
 
 
 def test_what_is_in_no_array_is_refused():

@@ -1,8 +1,8 @@
 """Memory, queue and graphs of a GPU that is not there. It is as unkind as a GPU may be.
 
-What is asked for happens when the host waits, and not before. The host cannot touch the memory; fresh and freed memory hold
-rubbish. The threads of a launch run in another order each time. While a thread captures a graph, it may neither take memory nor
-wait.
+What is asked for happens when the host waits, and not before. The host cannot touch the memory, fresh and freed memory hold
+rubbish, and what a kernel writes behind an array is an error. The threads of a launch run in another order each time. While a
+thread captures a graph, it may neither take memory nor wait.
 """
 
 import ctypes
@@ -16,7 +16,7 @@ from random import Random
 
 _ROOM = 4 << 30  # bytes of addresses; pages are had when they are written to
 _PAGE = mmap.PAGESIZE
-_FRESH, _FREED = 0xCB, 0xDD
+_FRESH, _FREED, _BESIDE = 0xCB, 0xDD, 0xEE
 _NOBODY, _READ_AND_WRITE = 0, 3
 
 _mprotect = ctypes.CDLL(None, use_errno=True).mprotect
@@ -30,7 +30,7 @@ class PaperGpuError(RuntimeError):
 
 
 class Memory:
-    """Arrays, each on pages of its own with an empty page behind it."""
+    """Arrays, each on pages of its own with a page behind it that nobody may write to."""
 
     def __init__(self):
         self._pages = mmap.mmap(-1, _ROOM, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
@@ -38,6 +38,7 @@ class Memory:
         self._next = self._start + _PAGE
         self._sizes: dict[int, int] = {}
         self._spare: dict[int, list[int]] = {}
+        self._marked: dict[int, int] = {}
         self._protect(_NOBODY)
 
     def take(self, size: int) -> int:
@@ -56,7 +57,21 @@ class Memory:
             raise PaperGpuError(f"{place:#x} is freed, and is none of the arrays")
         return self._sizes.pop(place)
 
+    def mark(self, place: int, size: int) -> None:
+        """Fill an array with rubbish, and what lies behind it."""
+        ctypes.memset(place, _FRESH, size)
+        ctypes.memset(place + size, _BESIDE, _beside(size))
+        self._marked[place] = size
+
+    def check_marks(self) -> None:
+        """Raise if something has been written beside an array."""
+        for place, size in self._marked.items():
+            if ctypes.string_at(place + size, _beside(size)) != bytes([_BESIDE]) * _beside(size):
+                raise PaperGpuError(f"behind the {size} bytes at {place:#x} something was written")
+
     def recycle(self, place: int, size: int) -> None:
+        ctypes.memset(place, _FREED, size)
+        del self._marked[place]
         self._spare.setdefault(_pages_of(size), []).append(place)
 
     def check(self, place: int, size: int) -> None:
@@ -135,6 +150,7 @@ class Gpu:
                 work, self._queue = self._queue, []
                 with self.memory.opened():
                     play(work)
+                    self.memory.check_marks()
 
     def forbid_while_capturing(self, what: str) -> None:
         if self.capturing:
@@ -144,18 +160,13 @@ class Gpu:
         self.forbid_while_capturing("memory is asked for")
         with self._lock:
             place = self.memory.take(size)
-        self.clean_up(lambda: ctypes.memset(place, _FRESH, size))
+        self.clean_up(lambda: self.memory.mark(place, size))
         return place
 
     def give_back(self, place: int) -> None:
         with self._lock:
             size = self.memory.give_back(place)
-
-        def free():
-            ctypes.memset(place, _FREED, size)
-            self.memory.recycle(place, size)
-
-        self.clean_up(free)
+        self.clean_up(lambda: self.memory.recycle(place, size))
 
     def launch(self, name: str, kernel: Callable, arguments: list[bytes], blocks: int, threads: int) -> None:
         """Ask for a launch of a kernel of ``ptx.Program``; arguments are copied now, as by a GPU."""
@@ -180,3 +191,8 @@ def play(graph: list[Work]) -> None:
 
 def _pages_of(size: int) -> int:
     return -(-max(size, 1) // _PAGE) * _PAGE
+
+
+def _beside(size: int) -> int:
+    """Bytes between an array and the next."""
+    return _pages_of(size) + _PAGE - size
