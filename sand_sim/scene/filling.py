@@ -79,9 +79,11 @@ def fill_grains(
         cause = "".join(f"; {what} takes {some} of its {places} places" for what, some in taken if 2 * some > places)
         times = wanted / room + 0.1 if room and not cause else np.inf
         enough = f", about {times:.1f} times as high," if times < _HIGHER else ""
+        remedy = f"enlarge 'region'{enough} or ask for fewer grains"
+        if any((wall.label, places) in taken for wall in walls if getattr(wall, "kind", "") == "plane"):
+            remedy = "'region' lies behind it: planes and sides of a 'box' have no end, those of a 'bin' have"
         raise SceneError(
-            f"fills: '{fill.name}' has room for {room} loosely packed grains but {wanted} are wanted{cause}; "
-            f"enlarge 'region'{enough} or ask for fewer grains"
+            f"fills: '{fill.name}' has room for {room} loosely packed grains but {wanted} are wanted{cause}; {remedy}"
         )
     turns = rotation.at_random(wanted, random) if shape else None
     return _table(position, radius, fill, material, index, shape, turns)

@@ -148,6 +148,14 @@ def test_two_bins_side_by_side_share_a_wall(make_world):
     assert world.observe().grains.position[:, 0] == pytest.approx([-0.005, 0.005], abs=1e-4)
 
 
+def test_whoever_wants_two_boxes_is_told_of_bins(tmp_path):
+    scene = heap(bin={}, other={})
+    for boundary, x in zip(scene["boundaries"][1:], (0.0, 0.1), strict=True):
+        boundary |= {"type": "box", "open": ["top"], "low": [x - 0.02, -0.02, 0.02], "high": [x + 0.02, 0.02, 0.1]}
+    with pytest.raises(SceneError, match=r"wall 'other/back' takes .* a 'box' have no end, those of a 'bin' have"):
+        World(read_scene(scene, tmp_path))
+
+
 def test_what_does_not_fit_is_refused(tmp_path):
     with pytest.raises(SceneError, match=r"boundaries\[1\].*rough"):
         read_scene(heap(bin={"rough": {"radius": 0.001}}), tmp_path)
