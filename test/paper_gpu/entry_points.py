@@ -3,8 +3,6 @@
 import ctypes
 import hashlib
 import os
-import shutil
-import tempfile
 import threading
 from collections.abc import Callable
 from itertools import count
@@ -270,7 +268,7 @@ def _missing(name: str) -> Callable:
     return fail
 
 
-_building = threading.Lock()
+_building, _loads = threading.Lock(), count()
 
 
 def _load(path: Path) -> dict[str, tuple[Callable, list[int]]]:
@@ -283,21 +281,16 @@ def _load(path: Path) -> dict[str, tuple[Callable, list[int]]]:
     compiled = path.with_name(f"{name[:16]}.paper.o")
     with _building:
         if not compiled.exists():
-            with tempfile.TemporaryDirectory() as folder:  # another process may be at it, too
-                source, made = Path(folder, "module.cpp"), Path(folder, "module.o")
-                source.write_text(program.source)
-                build_cpu(str(made), str(source), fuse_fp=False, optimization_level=1)
-                partly = compiled.with_suffix(f".{os.getpid()}")
-                shutil.copyfile(made, partly)
-                os.replace(partly, compiled)
+            source = compiled.with_suffix(f".{os.getpid()}.cpp")  # another process may be at it, too
+            source.write_text(program.source)
+            build_cpu(str(source.with_suffix(".o")), str(source), fuse_fp=False, optimization_level=1)
+            source.with_suffix(".o").replace(compiled)
+            source.unlink()
         unique = f"{name}_{next(_loads)}"
         if runtime.llvm.wp_load_obj(str(compiled).encode(), unique.encode(), wp.config.legacy_cpu_linker):
             raise PaperGpuError(f"{compiled} cannot be loaded")
         found = {entry: runtime.llvm.wp_lookup(unique.encode(), entry.encode()) for entry in program.entries}
     return {entry: (_SIGNATURE(found[entry]), sizes) for entry, sizes in program.entries.items()}
-
-
-_loads = count()
 
 
 def _address(value) -> int:
