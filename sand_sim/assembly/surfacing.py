@@ -9,7 +9,7 @@ from sand_sim.engine.plungers import Plunger
 from sand_sim.engine.recipe import CYLINDER, PANEL, PLANE, PLUNGER, ROUGH, SHELL
 from sand_sim.engine.surfaces import BOTH_SIDES, KINDS, NEAR_SIDE, NO_SIDE, Surface
 from sand_sim.scene.types import SceneError
-from sand_sim.scene.walls import Wall, across
+from sand_sim.scene.walls import Wall, tangents
 
 _MOST_NUMBERS = 2**31 - 1
 _SAME = 1e-6  # of a radius: rings nearer than that are one
@@ -51,7 +51,7 @@ def make_surfaces(
         surface.first = numbers
         surface.anchor = np.rint((wall.point - lattice.centre) / lattice.quantum)
         surface.direction = wall.direction
-        surface.across = across(wall.direction)
+        surface.across = tangents(wall.direction)[0]
         if wall.kind == CYLINDER:
             surface.begin = surface.end = np.array([wall.radius, 0.0]) / lattice.quantum
         if wall.kind == SHELL:
@@ -147,16 +147,16 @@ def _lay_spheres(surface: Surface, wall: Wall, lattice: Lattice) -> int:
         middle, half = -float(surface.anchor @ axis), float(reach @ np.abs(axis))
         return floor((middle - half) / step) - 2, ceil((middle + half) / step) + 2
 
-    direction, aside = np.asarray(wall.direction), across(wall.direction)
+    across, beside = tangents(wall.direction)
     if wall.kind == PLANE:
-        surface.first_column, last_column = span(aside, spacing)
-        first_row, last_row = span(np.cross(direction, aside), row_spacing)
+        surface.first_column, last_column = span(across, spacing)
+        first_row, last_row = span(beside, row_spacing)
         first_row -= first_row % 2
         surface.first_row, surface.columns = first_row, last_column - surface.first_column + 1
         surface.rows = last_row - first_row + 1
         return surface.rows * surface.columns
     if wall.kind == CYLINDER:
-        first_row, last_row = span(direction, row_spacing)
+        first_row, last_row = span(wall.direction, row_spacing)
         first_row -= first_row % 2
         surface.begin = np.array([wall.radius / lattice.quantum, first_row * row_spacing])
         surface.end = np.array([wall.radius / lattice.quantum, last_row * row_spacing])

@@ -67,7 +67,7 @@ class ShapeOutputs:
         """Those that lie in the domain."""
         markers = []
         for boundary in self._world.scene.boundaries:
-            if boundary.kind in ("box", "bin"):
+            if boundary.low is not None:
                 markers.append(self._box(boundary))
             elif not boundary.drive:
                 markers += [self._wall(wall, wall.point) for wall in walls_of(boundary)]

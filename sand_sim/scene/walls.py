@@ -28,7 +28,7 @@ class Wall:
         direction: plane normal towards the grains, panel normal into its bin, or axis, unit, shape (3,).
         radius: of the cylinder [m].
         begin, end: of the shell's line, distance from the axis and height above ``point``; of the panel, from ``point`` along
-            ``across(direction)`` and along the cross product of ``direction`` with that; shape (2,) [m].
+            each of ``tangents(direction)``; shape (2,) [m].
         joined: edges of the panel that another one stands on: 1 and 2 at begin and end along the first, 4 and 8 along the second.
         answers: those of them at which it is this one that grains outside of the corner touch.
         rough: its virtual spheres.
@@ -66,7 +66,7 @@ class Wall:
         if self.kind == "plane":
             return along - thickness
         if self.kind == "panel":
-            here = away @ self._sides.T
+            here = away @ tangents(self.direction).T
             beyond = here - np.clip(here, self.begin, self.end)
             return np.linalg.norm(np.column_stack([along, beyond]), axis=1)
         from_axis = np.linalg.norm(away - along[:, None] * self.direction, axis=1)
@@ -93,7 +93,7 @@ class Wall:
     def corners(self) -> np.ndarray | None:
         """Box around a shell or panel, shape (2, 3) [m]; None for what has no end."""
         if self.kind == "panel":
-            ends = self.point + np.array([self.begin, self.end]) @ self._sides
+            ends = self.point + np.array([self.begin, self.end]) @ tangents(self.direction)
             return np.array([ends.min(axis=0), ends.max(axis=0)])
         if self.kind != "shell":
             return None
@@ -101,25 +101,23 @@ class Wall:
         reach = max(self.begin[0], self.end[0]) * np.sqrt(1.0 - np.minimum(self.direction**2, 1.0))
         return np.array([middles.min(axis=0) - reach, middles.max(axis=0) + reach])
 
-    @property
-    def _sides(self) -> np.ndarray:
-        """Unit vectors along the sides of a panel, which are parallel to the coordinate axes, shape (2, 3)."""
-        first = across(self.direction)
-        return np.array([first, np.cross(self.direction, first)])
 
+def tangents(direction: np.ndarray) -> np.ndarray:
+    """Two unit vectors at right angles to a unit vector and to each other, shape (2, 3).
 
-def across(direction: np.ndarray) -> np.ndarray:
-    """Unit vector at right angles to a direction, as near as can be to the coordinate axis that is farthest from it."""
+    The first is as near as can be to the coordinate axis that is farthest from the direction, the second is their cross product.
+    """
     axis = np.eye(3)[np.argmin(np.abs(direction))]
-    aside = axis - (axis @ direction) * direction
-    return aside / np.linalg.norm(aside)
+    across = axis - (axis @ direction) * direction
+    across /= np.linalg.norm(across)
+    return np.array([across, np.cross(direction, across)])
 
 
 def walls_of(boundary: Boundary) -> list[Wall]:
     """The analytic surfaces of a boundary; one for each closed side of a box or a bin, none for a terrain."""
     if boundary.kind == "terrain":
         return []
-    if boundary.kind in ("box", "bin"):
+    if boundary.low is not None:
         return _sides(boundary)
     shape = {"kind": "shell"}
     if boundary.kind in ("plane", "plunger") and not boundary.radius:
@@ -154,9 +152,8 @@ def _edges(boundary: Boundary, side: str, closed: list[str]) -> dict:
     """How far a side of a bin reaches, and which others stand on its edges; the first of two answers at the one they share."""
     axis, lower = _BOX_SIDES[side]
     normal = np.eye(3)[axis] * (1.0 if lower else -1.0)
-    first = across(normal)
     begin, end, joined, answers = np.zeros(2), np.zeros(2), 0, 0
-    for k, along in enumerate((first, np.cross(normal, first))):
+    for k, along in enumerate(tangents(normal)):
         other = int(np.argmax(np.abs(along)))
         size = boundary.high[other] - boundary.low[other]
         forward = along[other] > 0.0  # along the axis, from the corner that the side is measured from

@@ -66,7 +66,7 @@ def _eye(scene: Scene, first: Observation) -> rrb.EyeControls3D | None:
     feet += [
         (*end[:2], boundary.low[2])
         for boundary in scene.boundaries
-        if boundary.kind in ("box", "bin")
+        if boundary.low is not None
         for end in (boundary.low, boundary.high)
     ]
     places = np.concatenate([grains - radius, grains + radius, np.reshape([*stops, *feet], (-1, 3))])

@@ -102,7 +102,7 @@ class Drawing:
         for boundary in world.scene.boundaries:
             number[boundary.name] += 1
             entity = f"world/walls/{boundary.name}" + (f"_{number[boundary.name]}" if number[boundary.name] > 1 else "")
-            if boundary.kind in ("box", "bin"):
+            if boundary.low is not None:
                 box = rr.Boxes3D(mins=[boundary.low], sizes=[np.subtract(boundary.high, boundary.low)], colors=[[150, 150, 160]])
                 recording.log(entity, box, static=True)
                 continue

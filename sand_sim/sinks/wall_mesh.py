@@ -3,7 +3,7 @@
 import numpy as np
 import trimesh
 
-from sand_sim.scene.walls import Wall
+from sand_sim.scene.walls import Wall, tangents
 
 _SECTIONS = 64
 _FLOOR = 0.5  # cosine of the slope up to which a plane is a floor
@@ -41,7 +41,7 @@ def plane_outline(wall: Wall, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
     It is a square wider than the domain, clipped along the faces of that; trimesh would need SciPy for it.
     """
-    across, beside = _tangents(wall.direction)
+    across, beside = tangents(wall.direction)
     wide = np.linalg.norm(high - low)
     middle = 0.5 * (low + high)
     middle = middle - (middle - wall.point) @ wall.direction * wall.direction
@@ -62,7 +62,7 @@ def plane_outline(wall: Wall, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 def _turned(axis: np.ndarray, line: list) -> tuple[np.ndarray, np.ndarray]:
     """A surface of revolution: a line between two places, distance from the axis and height along it [m], turned about it."""
-    across, beside = _tangents(axis)
+    across, beside = tangents(axis)
     angle = np.linspace(0.0, 2.0 * np.pi, _SECTIONS, endpoint=False)[:, None]
     radial = np.cos(angle) * across + np.sin(angle) * beside
     corners = np.concatenate([end[0] * radial + end[1] * axis for end in line])
@@ -70,10 +70,3 @@ def _turned(axis: np.ndarray, line: list) -> tuple[np.ndarray, np.ndarray]:
     outer, outer_after = here + _SECTIONS, after + _SECTIONS
     triangles = np.concatenate([np.column_stack([here, after, outer]), np.column_stack([after, outer_after, outer])])
     return corners, np.concatenate([triangles, triangles[:, ::-1]])
-
-
-def _tangents(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors across a unit vector and across each other."""
-    across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
-    across /= np.linalg.norm(across)
-    return across, np.cross(direction, across)

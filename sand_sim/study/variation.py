@@ -176,7 +176,7 @@ def _move_back(wall: dict, way: float) -> None:
     """Move a wall away from the grains, which lie above a terrain [m]; cylinders and cones stay where they are."""
     if "normal" in wall:
         wall["point"] = _shifted(wall["point"], -way * unit(wall["normal"]))
-    elif wall.get("type") in ("box", "bin"):
+    elif "low" in wall:
         wall["low"], wall["high"] = _shifted(wall["low"], [-way] * 3), _shifted(wall["high"], [way] * 3)
     elif wall.get("type") == "terrain":
         pose = wall.get("pose") or {}
