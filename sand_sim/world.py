@@ -28,6 +28,7 @@ from sand_sim.readout.observing import (
 )
 from sand_sim.readout.sweeping import SweptGround
 from sand_sim.readout.trust import BLOWN_UP, GAINED, gained_share
+from sand_sim.readout.wrenches import MeanWrenches
 from sand_sim.scene.types import Scene
 from sand_sim.settling import settle
 from sand_sim.tool_motion.commands import Command, check_command, check_steps, pose_after
@@ -65,8 +66,7 @@ class World(Changeable):
         self._solver.begin()
         self._solver.engage_plungers()
         self._start = start_energy(self.assembly)
-        tools = self._solver.arrays.tools
-        self._observed_steps, self._observed_wrench = 0, tools.wrench.numpy().copy() if tools else None
+        self._wrenches = MeanWrenches(self._solver.arrays.tools, now=0)
         self._swept = SweptGround(observe_spheres(self.assembly), self.assembly.tools, self._poses)
         self._loaded = replace(self.assembly, solver=None)
         self.identity = describe_scene(self._loaded)
@@ -92,7 +92,7 @@ class World(Changeable):
     @property
     def observed(self) -> bool:
         """Whether the present state has been observed."""
-        return self._observed_steps == self.steps
+        return self._wrenches.steps == self.steps
 
     @property
     def time_step(self) -> float:
@@ -194,9 +194,23 @@ class World(Changeable):
         """What the world shows now; forces on tools are means since the last observation."""
         steps, health, spheres = self._solver.steps_done, self._health(), observe_spheres(self.assembly)
         cloud = observe_grains(self.assembly, spheres)
-        reports = observe_tools(self.assembly, self._tracks, cloud, self.time, self._mean_wrenches(steps), self._sweep())
+        tools, half_steps = self._solver.arrays.tools, self.scene.solver.integrator == VERLET
+        means = self._wrenches.observe(tools, steps, self.time_step, half_steps)
+        reports = observe_tools(self.assembly, self._tracks, cloud, self.time, means, self._sweep())
         bodies = observe_bodies(self.assembly, cloud)
         return Observation(self.time, steps, cloud, reports, observe_walls(self.assembly), health, bodies, spheres)
+
+    def feel(self, tool: str) -> tuple[np.ndarray, np.ndarray]:
+        """Force of the sand on a tool and torque about its frame's origin, world frame, shape (3,) each [N], [N m].
+
+        Means over the steps since it was last felt. Nothing else is read, so that a controller may do so every few steps.
+
+        Raises:
+            CommandError: if the tool is unknown.
+        """
+        index = self._index_of(tool)
+        force, torque = self._wrenches.feel(self._solver.arrays.tools, index, self._solver.steps_done, self.time_step)
+        return force, torque
 
     def tool_contacts(self, tool: str) -> ToolContacts:
         """Every contact of a tool with grains now, with its force; read when asked for, so that no frame pays for it.
@@ -226,23 +240,6 @@ class World(Changeable):
         """Volumes swept by the tools up to now, shape (tools,) [m^3]."""
         return self._swept.advance(self._poses)
 
-    def _mean_wrenches(self, steps: int) -> np.ndarray | None:
-        """Mean wrenches on the tools since the last observation, those of now if no time has passed."""
-        tools = self._solver.arrays.tools
-        if tools is None:
-            return None
-        now, passed = tools.wrench.numpy().copy(), (steps - self._observed_steps) * self.time_step
-        means = now
-        if passed > 0.0:
-            impulse = tools.impulse.numpy().copy()
-            if self.scene.solver.integrator == VERLET:
-                # The half steps at both ends, so that means times time are exactly the momentum that the grains show.
-                impulse += 0.5 * self.time_step * (now - self._observed_wrench)
-            means = impulse / passed
-            tools.impulse.zero_()
-        self._observed_steps, self._observed_wrench = steps, now
-        return means
-
     def reset(self) -> None:
         """Go back to time zero."""
         self.restore(self._initial)
@@ -255,9 +252,9 @@ class World(Changeable):
             state[f"track.{name}"] = np.array([getattr(track, name) for track in self._tracks])
         self._sweep()
         state |= self._swept.save() | describe_changes(self.assembly, self._loaded) | {"scene": self._digest}
-        state["start"], state["observed_steps"] = np.array(astuple(self._start)), np.array(self._observed_steps)
-        if self._observed_wrench is not None:
-            state["observed_wrench"] = self._observed_wrench
+        state["start"], state["observed_steps"] = np.array(astuple(self._start)), np.array(self._wrenches.steps)
+        if self._wrenches.wrench is not None:
+            state["observed_wrench"] = self._wrenches.wrench
         return state
 
     def check_state(self, state: dict[str, np.ndarray]) -> None:
@@ -284,7 +281,8 @@ class World(Changeable):
         self._look_anew()
         self._swept.restore(state)
         self._start = StartEnergy(*(float(value) for value in state["start"]))
-        self._observed_steps, self._observed_wrench = int(state["observed_steps"]), state.get("observed_wrench")
+        observed, tools = (int(state["observed_steps"]), state.get("observed_wrench")), self._solver.arrays.tools
+        self._wrenches = MeanWrenches(tools, self._solver.steps_done, *observed)
         self._good, self._good_health, self._kept_steps = state, self._health(), self._solver.steps_done
 
     def _health(self) -> Health:

@@ -53,6 +53,11 @@ def test_trials_from_one_state_part_and_go_back_to_it(shown):
     assert all(np.array_equal(again[name], state[name]) for name in state)
 
 
+def test_the_plate_sinks_until_the_sand_bears_its_load(shown):
+    assert shown["borne"] == pytest.approx((1.0, 2.0, 4.0), rel=0.02)
+    assert 0.0 < shown["sinkage"][0] < shown["sinkage"][1] < shown["sinkage"][2] < 0.03
+
+
 def test_a_bed_without_its_walls_slumps(shown):
     """A block about as high as half its width reaches to about 1 + 1.24 times that ratio (Lube et al. 2004, for round ones)."""
     free, before = shown["free"].observe(), shown["grains"]

@@ -75,6 +75,42 @@ def test_force_times_time_is_momentum_given(make_plate_world, precision, toleran
     assert np.abs(impulse - gained).max() < tolerance * np.abs(before.mass * before.velocity[:, 2]).sum()
 
 
+@pytest.mark.parametrize("looks", [(), (2, 5, 11)], ids=["not observed", "observed"])
+def test_what_is_felt_is_the_momentum_that_grains_gain_meanwhile(make_plate_world, looks):
+    """Symplectic Euler's velocities gain just what each step's forces give; whoever observes in between takes nothing away."""
+    grains, solver = [[0.01, 0.0, 0.0072], [-0.02, 0.0, 0.0073]], {"integrator": "symplectic_euler"}
+    world, seen = (make_plate_world(grains, velocity=[0.1, 0.0, -0.5], solver=solver) for _ in range(2))
+    felt, told, momentum = [], [], []
+    for step in range(16):
+        if step % 4 == 0:
+            report, cloud = seen.observe().tool("plate"), seen.observe().grains
+            told.append([report.world_force, report.torque])
+            momentum.append(cloud.mass.astype(float) @ cloud.velocity)
+            felt.append(world.feel("plate"))
+        if step in looks:
+            world.observe()
+        world.step(4)
+        seen.step(4)
+    felt, gained = np.array(felt)[1:], np.diff(momentum, axis=0) / (16 * world.time_step)
+    assert np.count_nonzero(gained[:, 2]) > 1
+    assert felt[:, 0] == pytest.approx(-gained, rel=1e-5, abs=1e-5 * np.abs(gained).max())
+    assert felt == pytest.approx(np.array(told)[1:], rel=1e-12)
+
+
+def test_feeling_begins_anew_where_a_state_is_put_back(make_plate_world):
+    world = make_plate_world([[0.0, 0.0, 0.0072]], velocity=[0.0, 0.0, -0.5])
+    world.step(40)
+    state, first = world.save(), world.feel("plate")
+    world.step(40)
+    later = world.feel("plate")
+    assert first[0][2] != later[0][2]
+    world.restore(state)
+    world.step(40)
+    assert np.array_equal(world.feel("plate"), later)
+    with pytest.raises(CommandError, match="tool 'spade' is unknown"):
+        world.feel("spade")
+
+
 def test_particles_carry_the_tools_velocity(make_plate_world):
     """A rising plate throws a resting grain to (1 + e) times its own speed."""
     world = make_plate_world([[0.0, 0.0, 0.015]], restitution=0.7, friction=0.0, contact={"tangential": "none"})
