@@ -171,6 +171,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
         integrator=scene.solver.integrator,
         materials=len(_loose_materials(scene)) > 1,
         bodies=len(table.bodies) > 0,
+        pushed=len(bodies) > 0,
         smooth_tools=any(one.smooth for one in (*tools, *grounds)),
         surfaces=kinds_of(walls),
         carry=loses_digits(scene, time_step, precision, smallest, _fastest_rim(table)),
@@ -225,6 +226,7 @@ def build_solver(assembly: Assembly, setting: Setting, device, progress: Progres
         assembly.pair_table,
         device,
         assembly.plungers,
+        [model.lever for model in assembly.bodies],
     )
     return ExplicitDem(arrays, device, progress)
 

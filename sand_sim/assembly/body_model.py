@@ -40,6 +40,11 @@ class BodyModel:
         """What messages call it."""
         return f"body '{self.body.name}'"
 
+    @property
+    def lever(self) -> np.ndarray:
+        """From the centre of mass to the origin of the body's own frame, in the principal frame, shape (3,) [m]."""
+        return -self.shape.middle @ self.shape.axes
+
     def table(self, material: int) -> GrainTable:
         """The body and its spheres where the scene puts them, of the material with this index."""
         pose = self.body.pose

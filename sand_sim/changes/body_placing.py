@@ -17,6 +17,35 @@ from sand_sim.scene.stable_step import DEEP
 from sand_sim.scene.types import Body, Pose
 
 
+def find_body(assembly: Assembly, name: str) -> int:
+    """Number of a body among those of the scene.
+
+    Raises:
+        CommandError: if there is no such body.
+    """
+    names = [model.body.name for model in assembly.bodies]
+    if name not in names:
+        raise CommandError("unknown_body", f"body '{name}' is unknown; known are {', '.join(names) or 'none'}")
+    return names.index(name)
+
+
+def read_numbers(label: str, values, number: int) -> np.ndarray:
+    """So many finite numbers.
+
+    Raises:
+        CommandError: if they are none, which names them by the label.
+    """
+    try:
+        values = np.asarray(values, float)
+    except (TypeError, ValueError):
+        values = np.zeros(0)
+    if values.shape != (number,):
+        raise CommandError("misshapen", f"{label} must be {number} numbers")
+    if not np.isfinite(values).all():
+        raise CommandError("not_finite", f"{label} must be finite")
+    return values
+
+
 def read_body(assembly: Assembly, spheres: GrainCloud, name: str, position, orientation, velocity, spin) -> GrainTable:
     """A body and its spheres as they shall be.
 
@@ -32,22 +61,20 @@ def read_body(assembly: Assembly, spheres: GrainCloud, name: str, position, orie
     Raises:
         CommandError: if there is no such body, the numbers make no sense, or it would be outside of the domain or too fast.
     """
-    models, label = {model.body.name: model for model in assembly.bodies}, f"body '{name}'"
-    if name not in models:
-        raise CommandError("unknown_body", f"{label} is unknown; known are {', '.join(models) or 'none'}")
+    model, label = assembly.bodies[find_body(assembly, name)], f"body '{name}'"
     seen = {report.name: report for report in observe_bodies(assembly, observe_grains(assembly, spheres))}
-    here = seen.get(name) or _as_in_scene(models[name].body)
+    here = seen.get(name) or _as_in_scene(model.body)
     asked = {"position": (position, 3), "orientation": (orientation, 4), "velocity": (velocity, 3), "spin": (spin, 3)}
     position, orientation, velocity, spin = (
-        _numbers(f"{label}: {field}", getattr(here, field) if values is None else values, number)
+        read_numbers(f"{label}: {field}", getattr(here, field) if values is None else values, number)
         for field, (values, number) in asked.items()
     )
     try:
         pose = Pose(tuple(position.tolist()), tuple(rotation.unit(orientation).tolist()))
     except ValueError as error:
         raise CommandError("zero_quaternion", f"{label}: orientation is {error}") from None
-    moved = replace(models[name].body, pose=pose, velocity=tuple(velocity), spin=tuple(spin))
-    rows, lattice = replace(models[name], body=moved).table(0), assembly.lattice
+    moved = replace(model.body, pose=pose, velocity=tuple(velocity), spin=tuple(spin))
+    rows, lattice = replace(model, body=moved).table(0), assembly.lattice
     if not np.all((rows.bodies.position > lattice.low) & (rows.bodies.position < lattice.high)):
         box = f"{np.round(lattice.low, 3).tolist()} to {np.round(lattice.high, 3).tolist()} m"
         raise CommandError(
@@ -71,7 +98,7 @@ def put_body(assembly: Assembly, name: str, rows: GrainTable, spheres: GrainClou
     Raises:
         CommandError: if it overlaps anything by more than ``DEEP`` of a radius; nothing is changed then.
     """
-    number = sum(assembly.fill_numbers) + [model.body.name for model in assembly.bodies].index(name)
+    number = sum(assembly.fill_numbers) + find_body(assembly, name)
     others = spheres.identity != number
     rest = GrainCloud(*(getattr(spheres, field)[others] for field in GrainCloud.__dataclass_fields__))
     if blocked := find_obstacles(assembly, rest, poses, rows.position, (1.0 - DEEP) * rows.radius, of_body=name):
@@ -87,18 +114,6 @@ def put_body(assembly: Assembly, name: str, rows: GrainTable, spheres: GrainClou
 
 def _as_in_scene(body: Body) -> BodyReport:
     return BodyReport(body.name, body.pose.position, body.pose.orientation, body.velocity, body.spin, 0.0)
-
-
-def _numbers(label: str, values, number: int) -> np.ndarray:
-    try:
-        values = np.asarray(values, float)
-    except (TypeError, ValueError):
-        values = np.zeros(0)
-    if values.shape != (number,):
-        raise CommandError("misshapen", f"{label} must be {number} numbers")
-    if not np.isfinite(values).all():
-        raise CommandError("not_finite", f"{label} must be finite")
-    return values
 
 
 def _with(table, at: np.ndarray, rows, names: tuple[str, ...]):

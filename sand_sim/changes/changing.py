@@ -7,6 +7,7 @@ import numpy as np
 from sand_sim.assembly.assemble import Assembly
 from sand_sim.border import Health, ToolPose
 from sand_sim.changes.body_placing import put_body, read_body
+from sand_sim.changes.body_pushing import push
 from sand_sim.changes.carrying_over import carry_over, rebuild
 from sand_sim.changes.exchange import check_room, find_grains, read_grains
 from sand_sim.changes.tool_exchange import check_tool, read_tool
@@ -134,6 +135,22 @@ class Changeable:
         rows = read_body(self.assembly, spheres, body, position, orientation, velocity, spin)
         put_body(self.assembly, body, rows, spheres, self._poses)
         self._go_on_with(self.assembly)
+
+    def push_body(self, body: str, force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0)) -> None:
+        """Push a free rigid body from now on, until it is told otherwise: a load, a drive, or what a controller asks for.
+
+        The force acts at the origin of the body's own frame, wherever it moves; work that is done so is accounted for. ``reset``
+        ends it.
+
+        Args:
+            body: name.
+            force: world frame, shape (3,) [N].
+            torque: about the origin of the body's own frame, world frame, shape (3,) [N m].
+
+        Raises:
+            CommandError: if there is no such body, it has left the domain, or the numbers make no sense; nothing is changed then.
+        """
+        push(self.assembly, body, force, torque)
 
     def _go_on_with(self, assembly: Assembly) -> None:
         """Go on with other grains or tools, after a moment in which no time has passed.

@@ -63,6 +63,7 @@ class DemArrays:
         pairs: ``MaterialPair`` structs, one row per material.
         on: the device, from ``device.open_device``.
         drives: ``Plunger`` structs of the walls that move, in their order.
+        levers: of the last bodies, which may be pushed, see ``pushes.Push``.
     """
 
     def __init__(
@@ -76,6 +77,7 @@ class DemArrays:
         pairs: list,
         on,
         drives: Sequence = (),
+        levers: Sequence[np.ndarray] = (),
     ):
         self.recipe, self.setting, self.lattice, self.on = recipe, setting, lattice, on
         self.device = device = on.name
@@ -84,7 +86,7 @@ class DemArrays:
         self.flags = Flags(device)
         self.skin = Skin(setting.skin / lattice.quantum, setting.radius / lattice.quantum, device)
         self.grains = Grains(table, lattice, recipe, lanes, device)
-        self.bodies = Bodies(table, lattice, recipe, lanes, device) if recipe.bodies else None
+        self.bodies = Bodies(table, lattice, recipe, lanes, device, levers) if recipe.bodies else None
         self.felt_force = self.felt_torque = None
         if self.bodies:
             self.felt_force, self.felt_torque = (wp.zeros(number, dtype=precision.vec3, device=device) for _ in range(2))

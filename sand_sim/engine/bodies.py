@@ -1,10 +1,13 @@
 """Free rigid bodies as arrays on the device: what moves as one, while its spheres are sorted and searched like grains."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import warp as wp
 
 from sand_sim.engine.count import Count
 from sand_sim.engine.lattice import Lattice
+from sand_sim.engine.pushes import no_pushes
 from sand_sim.engine.recipe import Recipe
 from sand_sim.grain_table import GrainTable
 from sand_sim.integrator import VERLET
@@ -32,9 +35,19 @@ class Bodies:
         momentum: angular, world frame, half a step ago if the integrator asks, vec3d, shape (n,) [kg m^2/s].
         inertia: principal moments, vec3d, shape (n,) [kg m^2].
         seen_velocity, seen_spin: of now, for those who look, vec3d, shape (n,) [m/s], [rad/s].
+        pushes: ``Push`` structs of the last bodies, those that may be pushed; None unless the recipe asks.
+        unpushed: number of the bodies before them.
     """
 
-    def __init__(self, table: GrainTable, lattice: Lattice, recipe: Recipe, lanes: int, device: str):
+    def __init__(
+        self,
+        table: GrainTable,
+        lattice: Lattice,
+        recipe: Recipe,
+        lanes: int,
+        device: str,
+        levers: Sequence[np.ndarray] = (),
+    ):
         precision, bodies = recipe.precision, table.bodies
         number, owned = len(bodies), table.body[~table.lone]
         self.members = len(owned)
@@ -60,6 +73,7 @@ class Bodies:
         self.inertia = wp.array(bodies.inertia, dtype=wp.vec3d, device=device)
         self.momentum = wp.array(_angular_momentum(table), dtype=wp.vec3d, device=device)
         self.seen_velocity, self.seen_spin = (wp.zeros(number, dtype=wp.vec3d, device=device) for _ in range(2))
+        self.pushes, self.unpushed = no_pushes(levers, device) if recipe.pushed else None, number - len(levers)
 
 
 def _angular_momentum(table: GrainTable) -> np.ndarray:

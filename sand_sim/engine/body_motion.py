@@ -9,6 +9,7 @@ from sand_sim.engine.flags import FAULT_NOT_FINITE, FAULT_TOO_FAST
 from sand_sim.engine.free_rotation import ease_of, mean_spin, rotate_freely, spin_of
 from sand_sim.engine.kernel import kernel, sure
 from sand_sim.engine.prefetch import build_fetch_grain, build_prefetch
+from sand_sim.engine.pushes import Push, begin_push, end_push, mean_force, torque_about_centre
 from sand_sim.engine.recipe import Recipe
 from sand_sim.integrator import VERLET
 from sand_sim.precision import Precision
@@ -61,7 +62,7 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
     The angular momentum is advanced like the velocity, the orientation by ``free_rotation.rotate_freely``. A body whose centre
     leaves the domain is retired with all its spheres.
     """
-    precision, verlet = recipe.precision, recipe.integrator == VERLET
+    precision, verlet, pushed = recipe.precision, recipe.integrator == VERLET, recipe.pushed
     real, whole, vec3, vec4 = precision.real, precision.whole, precision.vec3, precision.vec4
     whole3, whole4, mat33 = precision.whole3, precision.whole4, precision.mat33
     gather_body, fetch_grain = build_gather_body(precision), build_fetch_grain(recipe)
@@ -92,6 +93,8 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
         origin: wp.array(dtype=whole4),
         felt_force: wp.array(dtype=vec3),
         felt_torque: wp.array(dtype=vec3),
+        pushes: wp.array(dtype=Push),
+        unpushed: int,
         gravity: vec3,
         dt: real,
         quantum: real,
@@ -119,6 +122,14 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
             first = starts[b]
             last = starts[b + 1]
             force, torque = gather_body(first, last, at, quantum, sphere_at, place, felt_force, felt_torque)
+            outer = Push()
+            if wp.static(pushed):
+                if b >= unpushed:
+                    outer = begin_push(pushes[b - unpushed], wp.static(not verlet) or starting[0] != 0)
+                    of_outer = mean_force(outer)
+                    force += vec3(of_outer)
+                    mean = wp.float64(0.5) * (outer.acted_torque + outer.torque)
+                    torque += vec3(torque_about_centre(outer, mean, of_outer, turn[b]))
             old = body_motion[b]
             gain = (force / old[3] + gravity) * dt
             push = wp.vec3d(wp.float64(torque[0]), wp.float64(torque[1]), wp.float64(torque[2])) * wp.float64(dt)
@@ -174,6 +185,9 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
             axes = wp.quat_to_matrix(turned)
             past_d = mean_spin(before, turned, wp.float64(dt))
             past = vec3(real(past_d[0]), real(past_d[1]), real(past_d[2]))
+            if wp.static(pushed):
+                if b >= unpushed:
+                    pushes[b - unpushed] = end_push(outer, before, wp.vec3d(velocity * dt), past_d * wp.float64(dt))
             omega = past
             if wp.static(verlet):
                 omega_d = spin_of(axes, turning_now, ease)
@@ -210,7 +224,7 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
 @cache
 def build_see_bodies(recipe: Recipe) -> wp.Kernel:
     """Kernel that completes the step of all bodies with the forces of now for lookers, as ``motion.build_complete_step``."""
-    precision, verlet = recipe.precision, recipe.integrator == VERLET
+    precision, verlet, pushed = recipe.precision, recipe.integrator == VERLET, recipe.pushed
     real, whole, vec3, vec4, whole4 = precision.real, precision.whole, precision.vec3, precision.vec4, precision.whole4
     mat33 = precision.mat33
     gather_body = build_gather_body(precision)
@@ -232,6 +246,8 @@ def build_see_bodies(recipe: Recipe) -> wp.Kernel:
         place: wp.array(dtype=whole4),
         felt_force: wp.array(dtype=vec3),
         felt_torque: wp.array(dtype=vec3),
+        pushes: wp.array(dtype=Push),
+        unpushed: int,
         gravity: vec3,
         dt: real,
         quantum: real,
@@ -253,6 +269,11 @@ def build_see_bodies(recipe: Recipe) -> wp.Kernel:
             turning = momentum[b]
             if wp.static(verlet) and starting[0] == 0:
                 force, torque = gather_body(first, last, at, quantum, sphere_at, place, felt_force, felt_torque)
+                if wp.static(pushed):
+                    if b >= unpushed:
+                        outer = pushes[b - unpushed]
+                        force += vec3(outer.acted_force)
+                        torque += vec3(torque_about_centre(outer, outer.acted_torque, outer.acted_force, turn[b]))
                 velocity = half_motion[b] + (force / of_b[3] + gravity) * (real(0.5) * dt)
                 push = wp.vec3d(wp.float64(torque[0]), wp.float64(torque[1]), wp.float64(torque[2]))
                 turning += push * (wp.float64(0.5) * wp.float64(dt))

@@ -46,7 +46,7 @@ def _see_bodies(arrays: DemArrays, recorder) -> None:
     gravity, quantum = precision.vec3(*setting.gravity), arrays.lattice.quantum
     inputs = [bodies.starts, bodies.sphere_at, bodies.offset, bodies.place, bodies.motion, bodies.half_motion]
     inputs += [bodies.turn, bodies.momentum, bodies.inertia, grains.place, arrays.felt_force, arrays.felt_torque]
-    inputs += [gravity, setting.dt, quantum, arrays.flags.starting, arrays.seen_motion]
+    inputs += [bodies.pushes, bodies.unpushed, gravity, setting.dt, quantum, arrays.flags.starting, arrays.seen_motion]
     # Only a half step completed writes the spheres' spin anew; where there is none it is left alone.
     inputs += [arrays.seen_spin if bodies.half_motion is not None else None, bodies.seen_velocity, bodies.seen_spin]
     recorder.each(body_motion.build_see_bodies(arrays.recipe), bodies.count, inputs)

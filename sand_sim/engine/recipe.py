@@ -19,6 +19,7 @@ class Recipe:
         precision: number types.
         materials: grains are of more than one material.
         bodies: some grains are rigid bodies of several spheres.
+        pushed: some of them may be pushed from outside.
         integrator: one of ``integrator.INTEGRATORS``.
         smooth_tools: grains touch the true surfaces of some tools, not their particles.
         surfaces: kinds of walls: ``plane``, ``cylinder``, ``shell``, ``panel``; and whether some are ``rough`` or a ``plunger``.
@@ -29,6 +30,7 @@ class Recipe:
     precision: Precision = SINGLE
     materials: bool = False
     bodies: bool = False
+    pushed: bool = False
     integrator: str = VERLET
     smooth_tools: bool = False
     surfaces: frozenset[str] = frozenset()

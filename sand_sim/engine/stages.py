@@ -243,7 +243,7 @@ def body_stage(arrays: DemArrays, recorder) -> None:
     inputs = [bodies.starts, bodies.sphere_at, bodies.offset, bodies.place, bodies.remainder, bodies.motion]
     inputs += [bodies.half_motion, bodies.motion_carry, bodies.turn, bodies.momentum, bodies.inertia]
     inputs += [grains.place, grains.motion, grains.spin, grains.half_motion, grains.half_spin, grains.origin]
-    inputs += [arrays.felt_force, arrays.felt_torque]
+    inputs += [arrays.felt_force, arrays.felt_torque, bodies.pushes, bodies.unpushed]
     inputs += [precision.vec3(*setting.gravity), setting.dt, lattice.quantum]
     inputs += [precision.whole3(*lattice.half_extent.tolist()), lattice.end]
     inputs += [flags.starting, arrays.carried_off, flags.grains_moved, flags.fault]

@@ -101,6 +101,7 @@ def _whole_arrays(arrays: DemArrays) -> dict[str, wp.array]:
     if arrays.bodies:
         names = ("sphere_at", "place", "remainder", "motion", "half_motion", "motion_carry", "turn", "momentum")
         found |= {f"bodies.{name}": getattr(arrays.bodies, name) for name in names}
+        found["pushes"] = arrays.bodies.pushes
     if tools:
         names = ("tracks", "states", "travelled", "wrench", "impulse", "twist", "way", "work")
         found |= {f"tools.{name}": getattr(tools, name) for name in names}

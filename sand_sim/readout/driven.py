@@ -1,4 +1,4 @@
-"""What tools and plungers have done to the grains, read from device arrays that the solver has just measured."""
+"""What tools, plungers and pushes have done to the grains, read from device arrays that the solver has just measured."""
 
 import numpy as np
 
@@ -31,6 +31,18 @@ def work_of_plungers(assembly: Assembly) -> np.ndarray:
     force = np.zeros(len(states))
     force[walls["plunger"][driven]] = along
     return states["work"] - 0.5 * dt * force * states["velocity"] * (assembly.recipe.integrator == VERLET)
+
+
+def work_of_pushes(assembly: Assembly) -> np.ndarray:
+    """Work of what pushes each of the scene's bodies up to now, shape (bodies,) [J]; its last half step as that of tools."""
+    bodies = assembly.solver.arrays.bodies
+    if bodies is None or bodies.pushes is None:
+        return np.zeros(0)
+    rows, axes = bodies.pushes.numpy(), rotation.to_matrices(bodies.turn.numpy()[bodies.unpushed :])
+    force = rows["acted_force"]
+    torque = rows["acted_torque"] + np.cross(np.einsum("nij,nj->ni", axes, rows["lever"]), force)
+    last = np.einsum("ij,ij->i", force, rows["way"]) + np.einsum("ij,ij->i", torque, rows["turn"])
+    return rows["work"] + 0.5 * last * (assembly.recipe.integrator == VERLET)
 
 
 def driven_speed(assembly: Assembly) -> float:

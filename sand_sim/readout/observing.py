@@ -8,7 +8,7 @@ from sand_sim import rotation
 from sand_sim.assembly.assemble import Assembly
 from sand_sim.border import BodyReport, GrainCloud, Health, ToolReport, WallReport
 from sand_sim.integrator import VERLET
-from sand_sim.readout.driven import driven_speed, forces_on_walls, work_of_plungers, work_of_tools
+from sand_sim.readout.driven import driven_speed, forces_on_walls, work_of_plungers, work_of_pushes, work_of_tools
 from sand_sim.readout.trust import find_doubts
 from sand_sim.tool_motion.track import Track
 
@@ -193,7 +193,7 @@ def count_grains(assembly: Assembly) -> int:
 
 
 def outer_force(assembly: Assembly, mass: float) -> tuple[np.ndarray, float]:
-    """What weight, walls, terrains and tools do to the grains now, shape (3,), and the sum of the sizes of it [N].
+    """What weight, walls, terrains, tools and pushes do to the grains now, shape (3,), and the sum of the sizes of it [N].
 
     Args:
         assembly: the world's, with forces brought up to now (``ExplicitDem.measure``).
@@ -208,6 +208,9 @@ def outer_force(assembly: Assembly, mass: float) -> tuple[np.ndarray, float]:
     if arrays.tools:
         on_tools = arrays.tools.wrench.numpy()[:, 0]
         outer, size = outer - on_tools.sum(axis=0), size + np.abs(on_tools).sum()
+    if arrays.bodies and arrays.bodies.pushes:
+        pushed = arrays.bodies.pushes.numpy()["acted_force"][arrays.bodies.place.numpy()[arrays.bodies.unpushed :, 3] > 0]
+        outer, size = outer + pushed.sum(axis=0), size + np.abs(pushed).sum()
     return outer, float(size)
 
 
@@ -252,7 +255,7 @@ def observe_health(assembly: Assembly, start: StartEnergy, beforehand: tuple[str
         beforehand: doubts that were there before the first step.
     """
     chosen, sums = assembly.time_step, assembly.solver.measure()
-    work = float(work_of_tools(assembly).sum() + work_of_plungers(assembly).sum())
+    work = float(sum(of(assembly).sum() for of in (work_of_tools, work_of_plungers, work_of_pushes)))
     kinetic = sums.translation + sums.rotation
     dissipated = start.total + work - kinetic - sums.height - sums.elastic - sums.carried_off
     start.most_dissipated = max(start.most_dissipated, dissipated)
