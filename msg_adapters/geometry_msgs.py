@@ -24,8 +24,8 @@ def command_to_pose(command: ToolPose, frame_id: str) -> PoseStamped:
     message.header.frame_id = frame_id
     if command.time is not None:
         message.header.stamp = time_to_stamp(command.time)
-    _fill(message.pose.position, command.position)
-    _fill(message.pose.orientation, command.orientation)
+    fill(message.pose.position, command.position)
+    fill(message.pose.orientation, command.orientation)
     return message
 
 
@@ -47,8 +47,8 @@ def command_to_twist(command: ToolVelocity, frame_id: str) -> TwistStamped:
     message.header.frame_id = frame_id
     if command.time is not None:
         message.header.stamp = time_to_stamp(command.time)
-    _fill(message.twist.linear, command.linear)
-    _fill(message.twist.angular, command.angular)
+    fill(message.twist.linear, command.linear)
+    fill(message.twist.angular, command.angular)
     return message
 
 
@@ -69,8 +69,8 @@ def frame_to_transform(frame: Frame) -> TransformStamped:
     """A frame to a transform of TF; one without a time gets a zero stamp."""
     message = TransformStamped(child_frame_id=frame.name)
     message.header.frame_id, message.header.stamp = frame.parent, time_to_stamp(frame.time or 0.0)
-    _fill(message.transform.translation, frame.position)
-    _fill(message.transform.rotation, frame.orientation)
+    fill(message.transform.translation, frame.position)
+    fill(message.transform.rotation, frame.orientation)
     return message
 
 
@@ -96,8 +96,8 @@ def arrays_to_wrench(force: np.ndarray, torque: np.ndarray, time: float, frame_i
     """
     message = WrenchStamped()
     message.header.stamp, message.header.frame_id = time_to_stamp(time), frame_id
-    _fill(message.wrench.force, force)
-    _fill(message.wrench.torque, torque)
+    fill(message.wrench.force, force)
+    fill(message.wrench.torque, torque)
     return message
 
 
@@ -114,7 +114,8 @@ def _quaternion(message) -> np.ndarray:
     return np.array([message.x, message.y, message.z, message.w])
 
 
-def _fill(message, values: np.ndarray) -> None:
+def fill(message, values: np.ndarray) -> None:
+    """Set x, y, z and, where there are four values, w of a message."""
     for name, value in zip("xyzw", values, strict=False):
         setattr(message, name, float(value))
 

@@ -1,5 +1,7 @@
 """``tf2_msgs``, which is not among the wheels: whether it is there, and frames to and from its messages."""
 
+from collections.abc import Iterable
+
 from msg_adapters.geometry_msgs import frame_to_transform, transform_to_frame
 from sand_sim.border import Frame
 
@@ -19,6 +21,6 @@ def message_to_frames(message, fixed: bool = False) -> list[Frame]:
     return [transform_to_frame(transform, fixed) for transform in message.transforms]
 
 
-def frames_to_message(frames: list[Frame]):
+def frames_to_message(frames: Iterable[Frame]):
     """Frames to a ``TFMessage``."""
     return TFMessage(transforms=[frame_to_transform(frame) for frame in frames])

@@ -45,6 +45,15 @@ class BodyModel:
         """From the centre of mass to the origin of the body's own frame, in the principal frame, shape (3,) [m]."""
         return -self.shape.middle @ self.shape.axes
 
+    def lead(self, spin: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+        """How much faster the centre of mass moves than the origin of the body's own frame, shape (3,) [m/s].
+
+        Args:
+            spin: world frame, shape (3,) [rad/s].
+            orientation: own frame to world frame, shape (4,).
+        """
+        return np.cross(spin, rotation.rotate(orientation, self.shape.middle))
+
     def table(self, material: int) -> GrainTable:
         """The body and its spheres where the scene puts them, of the material with this index."""
         pose = self.body.pose

@@ -1,4 +1,4 @@
-"""Services that change the world between two frames: states, grains, meshes, places of tools and bodies."""
+"""Services that change the world between two frames: states, grains, meshes, places of tools and bodies, and pushes."""
 
 import re
 from collections.abc import Callable
@@ -44,6 +44,7 @@ class ChangeServices:
             ("set_tool_mesh", {"tool": _TEXT, "mesh": _TEXT}, {"scale": _NUMBER}, self._set_mesh),
             ("place_tool", {"tool": _TEXT, "position": _NUMBERS}, {"orientation": _NUMBERS}, self._place),
             ("place_body", {"body": _TEXT, "position": _NUMBERS}, dict.fromkeys(_OF_BODY, _NUMBERS), self._put),
+            ("push_body", {"body": _TEXT}, dict.fromkeys(("force", "torque"), _NUMBERS), self._push),
         ):
             connections.service(SetParametersAtomically, f"~/{name}", self._answering(needed, optional, ask))
 
@@ -120,6 +121,13 @@ class ChangeServices:
             return f"body '{body}' is there"
 
         return self._simulation.change(act)
+
+    def _push(self, body: str, **wrench: list):
+        def act() -> str:
+            self._world.push_body(body, **wrench)
+            return f"body '{body}' is pushed"
+
+        return self._simulation.request(act)
 
 
 def _triples(name: str, values: Any, number: int | None = None) -> np.ndarray:

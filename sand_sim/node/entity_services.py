@@ -148,7 +148,7 @@ class EntityServices:
     def _of_centre(self, body: str, spin: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """How much faster the centre of mass of a body moves than its frame's origin [m/s]."""
         model = next(model for model in self._simulation.world.assembly.bodies if model.body.name == body)
-        return np.cross(spin, rotation.rotate(orientation, model.shape.middle))
+        return model.lead(spin, orientation)
 
     def _state(self, report: ToolReport | BodyReport, time: float):
         velocity = report.velocity

@@ -20,6 +20,7 @@ from sand_sim.config_folder import find_scene
 from sand_sim.courses import StampRules
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.node.bed_outputs import BedOutputs, coarse_points
+from sand_sim.node.body_ports import BodyPorts
 from sand_sim.node.change_services import ChangeServices
 from sand_sim.node.connections import Connections
 from sand_sim.node.diagnosis import Diagnosis
@@ -219,23 +220,24 @@ class SandSimNode(ManagedNode):
         return checkpoints
 
     def _connect(self, world: World, frames: FrameTree) -> None:
-        connections = Connections(self, in_haste=lambda: self.simulation.pacing == "lockstep")
-        parameters = self.parameters
+        parameters, connections = self.parameters, Connections(self, in_haste=lambda: self.simulation.pacing == "lockstep")
         self._endings.callback(connections.close)
         self._clock_publisher = connections.publisher(Clock, "/clock") if parameters["publish_clock"] else None
         self._diagnostics = connections.publisher(DiagnosticArray, "/diagnostics")
         self._frames = connections.publisher(tf2_msgs.TFMessage, "/tf") if tf2_msgs.TFMessage else None
-        self._tools = [ToolOutputs(connections, parameters, world, tool.name) for tool in world.scene.tools]
+        tools = [ToolOutputs(connections, parameters, world, tool.name) for tool in world.scene.tools]
         self._shapes = ShapeOutputs(connections, parameters, world)
         self._bed = BedOutputs(connections, parameters, world, self._complain)
         self._endings.callback(self._bed.close)
-        inputs = ToolInputs(connections, parameters, self.simulation, lambda: self._active, frames, lambda: self._last)
+        shared = connections, parameters, self.simulation, lambda: self._active, frames
+        ToolInputs(*shared, lambda: self._last)
+        self._movers = [*tools, *(BodyPorts(*shared, model) for model in world.assembly.bodies)]
         self.answering = Services(self, connections, self.simulation, self.hold)
         ChangeServices(connections, self.answering, self.simulation, Path(expanduser(parameters["states"])))
         if simulation_interfaces.srv is None:
             self.get_logger().info("simulation_interfaces is not installed: its services are absent", once=True)
         else:
-            SimulationServices(self, connections, self.answering, self.simulation, inputs.frames, lambda: self._last)
+            SimulationServices(self, connections, self.answering, self.simulation, frames, lambda: self._last)
         name = self.get_fully_qualified_name().lstrip("/")
         self._diagnosis = Diagnosis(self.simulation, name, self.get_logger().warning)
         self._watch = GraphWatch(self, parameters, [tool.name for tool in world.scene.tools])
@@ -247,7 +249,7 @@ class SandSimNode(ManagedNode):
         self._endings.close()
         # The node may go on for long: what it still held would keep the world's memory and its threads.
         self.simulation = self.recorder = self.answering = self._last = self._diagnosed = None
-        self._tools, self._shapes, self._bed, self._diagnosis, self._watch = [], None, None, None, None
+        self._movers, self._shapes, self._bed, self._diagnosis, self._watch = [], None, None, None, None
 
     def _finish_files(self) -> None:
         for path in self.recorder.close():
@@ -275,16 +277,16 @@ class SandSimNode(ManagedNode):
 
     def _publish_state(self, observation: Observation) -> None:
         self._publish_clock(observation)
-        for tool in self._tools:
-            tool.publish(observation)
+        for mover in self._movers:
+            mover.publish(observation)
         self._shapes.publish(observation)
         self._publish_frames(observation)
 
     def _publish_frames(self, observation: Observation) -> None:
         if self._frames:
             self._frame_readers = self._frames.get_subscription_count()
-            frames = [tool.frame(observation) for tool in self._tools if not tool.follows]
-            self._frames.publish(tf2_msgs.frames_to_message(frames))
+            frames = [mover.frame(observation) for mover in self._movers if not mover.follows]
+            self._frames.publish(tf2_msgs.frames_to_message(filter(None, frames)))
 
     def _complain(self, error: Exception) -> None:
         if self.context.ok():
@@ -321,8 +323,8 @@ class SandSimNode(ManagedNode):
         """
         if observation is self._last:
             self._publish_clock(observation)
-            for tool in self._tools:
-                tool.tell_pose(observation)
+            for mover in self._movers:
+                mover.tell_pose(observation)
             if self._frames and self._frames.get_subscription_count() != self._frame_readers:
                 self._publish_frames(observation)
             self._bed.tell(observation)

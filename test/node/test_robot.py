@@ -67,7 +67,7 @@ def test_a_link_is_driven_by_poses_in_a_fixed_frame(client, start_node):
     low, high = node.simulation.world.assembly.tools[0].mesh.bounds
     assert low == pytest.approx([-0.03, -0.03, -0.002], abs=1e-6)
     assert high == pytest.approx([0.03, 0.03, 0.05], abs=1e-6), "mesh and handle are one"
-    assert node._tools[0].follows, "robot_state_publisher tells where the link is, and TF allows one parent only"
+    assert node._movers[0].follows, "robot_state_publisher tells where the link is, and TF allows one parent only"
     client.send(START, at=0.7, frame="blade")
     client.wait_for(lambda: node.simulation.rejected == {"unknown_frame": 1})
     assert "frame 'blade' does not hang on 'world'" in node.simulation.last_rejection, "it is behind a movable joint"

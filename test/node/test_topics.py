@@ -81,7 +81,7 @@ def test_tools_tell_what_they_feel_and_carry(client, start_node):
     assert swept[-1].data == pytest.approx(report.swept, rel=1e-6, abs=1e-12)
     last = node.simulation.request(node.simulation.world.observe).result(30.0)
     full = replace(last, tools=(replace(report, carried=1.25, swept=2.5),))  # as such a small tool never is
-    node.simulation.request(lambda: node._tools[0].publish(full)).result(30.0)
+    node.simulation.request(lambda: node._movers[0].publish(full)).result(30.0)
     client.wait_for(lambda: (carried[-1].data, swept[-1].data) == (1.25, 2.5))
 
     raw, smooth = (
@@ -129,7 +129,7 @@ def test_wrenches_of_a_turned_tool_are_in_the_axes_that_are_asked_for(client, st
         meant = expected[kind] if axes == "world" else rotation.rotate(rotation.inverse(turns[-1]), expected[kind])
         assert message.header.frame_id == ("world" if axes == "world" else "plate")
         assert np.array(wrench_to_arrays(message)) == pytest.approx(meant, rel=1e-6, abs=1e-9)
-    frame = node._tools[0].frame(node.recorder.log.last)  # as TF tells it
+    frame = node._movers[0].frame(node.recorder.log.last)  # as TF tells it
     assert (frame.name, frame.parent, frame.time) == ("plate", "world", pytest.approx(0.6, abs=1e-5))
     assert frame.position == pytest.approx(PRESSED)
     assert frame.orientation == pytest.approx(turns[-1])
