@@ -5,7 +5,6 @@ from nav_msgs.msg import MapMetaData, Odometry
 
 from msg_adapters.builtin_interfaces import time_to_stamp
 from msg_adapters.geometry_msgs import fill
-from sand_sim import rotation
 from sand_sim.border import BodyReport
 
 
@@ -23,12 +22,12 @@ def grid_to_metadata(low: np.ndarray, cell: float, shape: tuple[int, int]) -> Ma
     return message
 
 
-def body_to_odometry(report: BodyReport, velocity: np.ndarray, time: float, frame_id: str, child_frame_id: str) -> Odometry:
-    """Where a body is, in the world frame, and how it moves, in its own frame, as the message has it; nothing is uncertain.
+def body_to_odometry(report: BodyReport, twist: np.ndarray, time: float, frame_id: str, child_frame_id: str) -> Odometry:
+    """Where a body is, in the world frame, and how it moves, in its own; nothing is uncertain.
 
     Args:
         report: of the body.
-        velocity: of its frame's origin, world frame, shape (3,) [m/s].
+        twist: velocity of its frame's origin [m/s] and spin [rad/s], in its own frame, shape (2, 3).
         time: of the observation [s].
         frame_id: of the world frame.
         child_frame_id: of the body's own.
@@ -37,7 +36,6 @@ def body_to_odometry(report: BodyReport, velocity: np.ndarray, time: float, fram
     message.header.frame_id, message.header.stamp = frame_id, time_to_stamp(time)
     fill(message.pose.pose.position, report.position)
     fill(message.pose.pose.orientation, report.orientation)
-    linear, angular = rotation.rotate(rotation.inverse(report.orientation), np.array([velocity, report.spin]))
-    fill(message.twist.twist.linear, linear)
-    fill(message.twist.twist.angular, angular)
+    fill(message.twist.twist.linear, twist[0])
+    fill(message.twist.twist.angular, twist[1])
     return message

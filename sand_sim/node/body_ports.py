@@ -57,8 +57,9 @@ class BodyPorts:
         if report := self._report(observation):
             self._turn = report.orientation
             velocity = report.velocity - self._model.lead(report.spin, report.orientation)
+            twist = rotation.rotate(rotation.inverse(report.orientation), np.array([velocity, report.spin]))
             world = self._parameters["frame_id"]
-            self._odometry.publish(body_to_odometry(report, velocity, observation.time, world, self._frame_id))
+            self._odometry.publish(body_to_odometry(report, twist, observation.time, world, self._frame_id))
 
     tell_pose = publish
 
