@@ -63,7 +63,7 @@ def test_a_body_is_pushed_in_the_axes_of_a_frame_and_tells_how_it_moves_in_its_o
     node = start_node(AFLOAT, pacing="lockstep")
     connect(client, node, pushes, heard)
     pushes.publish(arrays_to_wrench([0.02, 0.0, 0.0], [0.0, 0.0, 1e-5], 0.0, frame))
-    client.wait_for(lambda: node.simulation.world.assembly.solver.arrays.bodies.pushes.numpy()["force"].any())
+    client.wait_for(lambda: np.any(node.simulation.world.assembly.solver.arrays.bodies.pushes.numpy()["force"]))
     begin = stamp_to_time(heard[-1].header.stamp)
     for _ in range(5):
         told = step(client, heard)
