@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from sand_sim.border import CommandError, Observation, ToolPose, ToolVelocity
     from sand_sim.engine.explicit_dem import UnstableError
+    from sand_sim.following import follow
     from sand_sim.scene.reading import load_scene, read_scene
     from sand_sim.scene.types import Scene, SceneError
+    from sand_sim.tool_motion.playing import frame_times
     from sand_sim.world import World
 
 __all__ = [
@@ -19,6 +21,8 @@ __all__ = [
     "ToolVelocity",
     "UnstableError",
     "World",
+    "follow",
+    "frame_times",
     "load_scene",
     "read_scene",
 ]
@@ -32,6 +36,8 @@ _HOMES = {
     "ToolVelocity": "border",
     "UnstableError": "engine.explicit_dem",
     "World": "world",
+    "follow": "following",
+    "frame_times": "tool_motion.playing",
     "load_scene": "scene.reading",
     "read_scene": "scene.reading",
 }

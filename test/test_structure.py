@@ -43,7 +43,7 @@ BELOW["assembly"] = BELOW["engine"] | {"engine", "scene", "tool_motion", "border
 BELOW["readout"] = BELOW["assembly"] | {"assembly"}
 BELOW["changes"] = BELOW["readout"] | {"readout"}
 BELOW["sinks"] = BELOW["changes"] | {"world"}
-BELOW["study"] = BELOW["changes"] | {"world"}
+BELOW["study"] = BELOW["changes"] | {"world", "following"}
 WITHOUT_SAMPLER = {"contact", "engine", "scene"}
 BELOW_IN_SAMPLER = {
     "geometry": {"launching"},

@@ -27,7 +27,7 @@ from sand_sim.scene.stable_step import DEEP
 from sand_sim.scene.time_step import TimeStep, choose_time_step, fastest_speed, loses_digits
 from sand_sim.scene.types import Scene, SceneError
 from sand_sim.scene.walls import Wall, walls_of
-from sand_sim.tool_motion.playing import check_trajectory
+from sand_sim.tool_motion.playing import check_trajectory, pose_times
 
 _SKIN = 0.25  # of the mean grain radius
 _SPHERES_PER_THREAD = 1000
@@ -143,7 +143,7 @@ def assemble(scene: Scene, progress: Progress = lambda stage, share: None) -> As
     finest = smallest_sphere(scene.fills) if scene.tools or scene.bodies else None
     tools = [model_tool(tool, scene, finest, progress) for tool in scene.tools]
     for model in tools:
-        check_trajectory(model.tool, model.reach, 1.0 / scene.frame_rate)
+        check_trajectory(model.tool, model.reach, pose_times(scene, 0.0, 1.0 / scene.frame_rate)[0])
     grounds = [
         model_ground(one, scene.folder, lambda share, name=one.name: progress(f"sampling {name}", share))
         for one in scene.boundaries

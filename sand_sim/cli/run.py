@@ -15,11 +15,12 @@ from sand_sim.cli.numbers import count, positive
 from sand_sim.cli.writing import make_folder, place
 from sand_sim.config_folder import find_scene
 from sand_sim.engine.explicit_dem import UnstableError
+from sand_sim.following import follow
 from sand_sim.interruption import Interruption
 from sand_sim.report import progress_line, summary_text
 from sand_sim.sinks.recorder import Recorder, RecordingError, require_rerun
 from sand_sim.sinks.run_log import RunLog
-from sand_sim.tool_motion.playing import commands_at, frame_times
+from sand_sim.tool_motion.playing import frame_times
 from sand_sim.world import World
 
 
@@ -75,9 +76,7 @@ def execute(options: argparse.Namespace, interruption: Interruption) -> int:
     begin = world.time + 0.5 * world.time_step
     for time in (time for time in frame_times(scene, options.duration) if time > begin):
         try:
-            for command in commands_at(scene, time):
-                world.apply(command)
-            world.step(round((time - world.time) / world.time_step))
+            follow(world, time)
         except (CommandError, UnstableError) as error:
             recorder.log.fault = str(error)
             break

@@ -2,6 +2,7 @@
 
 import sys
 import time
+from itertools import pairwise
 
 import rclpy
 from geometry_msgs.msg import PoseStamped
@@ -16,7 +17,7 @@ from msg_adapters.geometry_msgs import command_to_pose
 from sand_sim.interruption import Interruption
 from sand_sim.node.security import demand_security
 from sand_sim.scene.types import Scene, SceneError
-from sand_sim.tool_motion.playing import commands_at, driven_tools, frame_times
+from sand_sim.tool_motion.playing import commands_at, driven_tools, frame_times, pose_times
 
 _AHEAD = 0.2  # [s] of simulated time by which poses are sent before they are due
 _PATIENCE = 3.0  # [s] of waiting after which it is told what for
@@ -62,7 +63,8 @@ def play(scene: Scene, target: str, frame_id: str, clock_topic: str, interruptio
         publishers = {
             name: node.create_publisher(PoseStamped, f"/{target}/tools/{name}/pose", QoSProfile(depth=100)) for name in driven
         }
-        times = frame_times(scene)
+        ends = [0.0, *frame_times(scene)]
+        times = (moment for begin, end in pairwise(ends) for moment in pose_times(scene, begin, end))
         due, begun, told_at = next(times, None), False, time.monotonic() + _PATIENCE
         while not interruption.asked:
             rclpy.spin_once(node, timeout_sec=0.05)

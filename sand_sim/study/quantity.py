@@ -7,11 +7,12 @@ from typing import Protocol
 import numpy as np
 
 from sand_sim.border import Observation
+from sand_sim.following import follow
 from sand_sim.readout.trust import kind_of
 from sand_sim.scene.types import Scene, SceneError
 from sand_sim.study.impact import Impact
 from sand_sim.study.sample import Sample
-from sand_sim.tool_motion.playing import commands_at, frame_times
+from sand_sim.tool_motion.playing import frame_times
 from sand_sim.world import World
 
 SMOOTHED = 0.1  # of the duration: standard width of the moving mean over histories
@@ -42,11 +43,8 @@ def play(world: World, look: Callable[[Observation], dict], check: Callable[[], 
     rows, times, spent, seen, doubts = [], [], 0.0, world.observe(), {}
     for moment in frame_times(world.scene):
         check()
-        for command in commands_at(world.scene, moment):
-            world.apply(command)
-        number = round((moment - world.time) / world.time_step)
         begin = time.perf_counter()
-        world.step(number)
+        follow(world, moment)
         spent += time.perf_counter() - begin
         seen = world.observe()
         times.append(seen.time)

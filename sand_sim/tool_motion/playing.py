@@ -17,6 +17,13 @@ def frame_times(scene: Scene, duration: float | None = None) -> Iterator[float]:
         yield (k + 1) / scene.frame_rate
 
 
+def pose_times(scene: Scene, begin: float, end: float) -> list[float]:
+    """When poses must be told between two times for tools to pass all their waypoints: there, and at the end [s]."""
+    least = 1e-6 / scene.frame_rate  # from one to the next: waypoints are meant to lie at ends of frames that are rounded
+    times = {stop.time for tool in scene.tools for stop in tool.trajectory if begin + least < stop.time < end - least}
+    return [*sorted(times), end]
+
+
 def driven_tools(scene: Scene) -> list[str]:
     """Names of the tools with a trajectory.
 
@@ -35,13 +42,13 @@ def commands_at(scene: Scene, time: float) -> list[ToolPose]:
     return [ToolPose(tool.name, *pose_on_trajectory(tool.trajectory, time), time) for tool in driven]
 
 
-def check_trajectory(tool: Tool, reach: Reach, frame: float) -> None:
+def check_trajectory(tool: Tool, reach: Reach, first: float) -> None:
     """See that a tool can follow its trajectory, before the run that would end where it cannot.
 
     Args:
         tool: with a trajectory or without.
         reach: its reach.
-        frame: time to the first pose that is played [s].
+        first: time of the first pose that is played [s].
 
     Raises:
         SceneError: naming the waypoint and how to mend it.
@@ -55,10 +62,10 @@ def check_trajectory(tool: Tool, reach: Reach, frame: float) -> None:
                 "give it more time or a shorter way, or raise 'max_speed'"
             )
     if tool.trajectory:
-        way = travel(_arrays(tool.pose), pose_on_trajectory(tool.trajectory, frame), reach)
-        if way > SPEED_TOLERANCE * tool.max_speed * frame:
+        way = travel(_arrays(tool.pose), pose_on_trajectory(tool.trajectory, first), reach)
+        if way > SPEED_TOLERANCE * tool.max_speed * first:
             raise SceneError(
-                f"{where}.pose: is {way:.3g} m from where the trajectory has it after the first frame, {frame:.3g} s, farther "
+                f"{where}.pose: is {way:.3g} m from where the trajectory has it {first:.3g} s later, farther "
                 f"{fastest} allows; leave it out, and the tool begins where its trajectory does"
             )
 
