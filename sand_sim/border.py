@@ -136,9 +136,8 @@ class ToolReport:
         orientation: tool frame to world frame, shape (4,).
         velocity: of the origin over the last step, shape (3,) [m/s].
         spin: over the last step, shape (3,) [rad/s].
-        force: of the sand on the tool, mean over the frame, in the tool frame, shape (3,) [N].
-        torque: the same about the tool frame's origin, in the tool frame, shape (3,) [N m].
-        world_force: the mean force in the world frame, shape (3,) [N].
+        force, torque: of the sand about its frame's origin, means over the frame in axes that turn with it, (3,) [N], [N m].
+        world_force, world_torque: the same in the axes of the world.
         work: of the tool on the sand since the start [J].
         carried: mass of the grains whose centres are inside the tool's bounding box [kg].
         swept: ground below the bed's first surface that it has passed through since the start, in cells a grain wide [m^3].
@@ -152,6 +151,7 @@ class ToolReport:
     force: np.ndarray
     torque: np.ndarray
     world_force: np.ndarray
+    world_torque: np.ndarray
     work: float
     carried: float
     swept: float = 0.0

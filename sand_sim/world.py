@@ -13,7 +13,6 @@ from sand_sim.changes.changing import Changeable
 from sand_sim.engine.explicit_dem import ExplicitDem, UnstableError
 from sand_sim.engine.state_check import check_layout, check_numbers
 from sand_sim.engine.tools import ToolTrack
-from sand_sim.integrator import VERLET
 from sand_sim.readout.beforehand import find_coarseness, find_fine_surfaces, find_overlap
 from sand_sim.readout.contact_reading import observe_grain_contacts, observe_tool_contacts
 from sand_sim.readout.observing import (
@@ -66,7 +65,7 @@ class World(Changeable):
         self._solver.begin()
         self._solver.engage_plungers()
         self._start = start_energy(self.assembly)
-        self._wrenches = MeanWrenches(self._solver.arrays.tools, now=0)
+        self._wrenches = MeanWrenches(self._solver.arrays, self._turns, now=0)
         self._swept = SweptGround(observe_spheres(self.assembly), self.assembly.tools, self._poses)
         self._loaded = replace(self.assembly, solver=None)
         self.identity = describe_scene(self._loaded)
@@ -194,8 +193,7 @@ class World(Changeable):
         """What the world shows now; forces on tools are means since the last observation."""
         steps, health, spheres = self._solver.steps_done, self._health(), observe_spheres(self.assembly)
         cloud = observe_grains(self.assembly, spheres)
-        tools, half_steps = self._solver.arrays.tools, self.scene.solver.integrator == VERLET
-        means = self._wrenches.observe(tools, steps, self.time_step, half_steps)
+        means = self._wrenches.observe(self._solver.arrays, self._turns, steps)
         reports = observe_tools(self.assembly, self._tracks, cloud, self.time, means, self._sweep())
         bodies = observe_bodies(self.assembly, cloud)
         return Observation(self.time, steps, cloud, reports, observe_walls(self.assembly), health, bodies, spheres)
@@ -209,7 +207,7 @@ class World(Changeable):
             CommandError: if the tool is unknown.
         """
         index = self._index_of(tool)
-        force, torque = self._wrenches.feel(self._solver.arrays.tools, index, self._solver.steps_done, self.time_step)
+        force, torque = self._wrenches.feel(self._solver.arrays, index, self.steps)
         return force, torque
 
     def tool_contacts(self, tool: str) -> ToolContacts:
@@ -230,6 +228,10 @@ class World(Changeable):
     @property
     def _poses(self) -> list[tuple[np.ndarray, np.ndarray]]:
         return [track.at(self.time) for track in self._tracks]
+
+    @property
+    def _turns(self) -> list[np.ndarray]:
+        return [track.at(self.time)[1] for track in [*self._tracks, *self._grounds]]
 
     def _index_of(self, tool: str) -> int:
         if tool not in self._tool_index:
@@ -281,8 +283,8 @@ class World(Changeable):
         self._look_anew()
         self._swept.restore(state)
         self._start = StartEnergy(*(float(value) for value in state["start"]))
-        observed, tools = (int(state["observed_steps"]), state.get("observed_wrench")), self._solver.arrays.tools
-        self._wrenches = MeanWrenches(tools, self._solver.steps_done, *observed)
+        observed = int(state["observed_steps"]), state.get("observed_wrench")
+        self._wrenches = MeanWrenches(self._solver.arrays, self._turns, self.steps, *observed)
         self._good, self._good_health, self._kept_steps = state, self._health(), self._solver.steps_done
 
     def _health(self) -> Health:

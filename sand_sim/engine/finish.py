@@ -7,7 +7,7 @@ import warp as wp
 from sand_sim.engine.count import count_of
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.tool_contacts import SUM_BLOCK
-from sand_sim.engine.tools import ToolTrack, build_tool_state_at, tool_types
+from sand_sim.engine.tools import ToolTrack, build_tool_state_at, rotation_at, tool_types
 from sand_sim.precision import Precision
 
 _ON_TIME = 1e-6  # of a step: a velocity that changes less than that after the step has begun changes with it
@@ -82,7 +82,7 @@ def sum_impulses(
     way: wp.array2d(dtype=wp.vec3d),
     work: wp.array(dtype=wp.float64),
 ):
-    """Impulse of the wrenches over the frame, shape (tools, 2), and work of the tools on the sand since the start.
+    """Impulse of the wrenches over the frame, shape (tools, 4), and work of the tools on the sand since the start.
 
     The work of a wrench is that over half the way of the step before and half that of the step after. ``way`` has shape (tools,
     2): of the frame's origin and turn over the step before, then over the step after; ``twist`` the same, velocity and spin.
@@ -99,6 +99,9 @@ def sum_impulses(
         impulse[tool, 0] = impulse[tool, 0] + force * dt
         impulse[tool, 1] = impulse[tool, 1] + torque * dt
         track = tracks[tool]
+        rotation = rotation_at(track, time)
+        impulse[tool, 2] = impulse[tool, 2] + wp.quat_rotate_inv(rotation, force) * dt
+        impulse[tool, 3] = impulse[tool, 3] + wp.quat_rotate_inv(rotation, torque) * dt
         velocity = wp.vec3d(wp.float64(0.0))
         spin = wp.vec3d(wp.float64(0.0))
         moving = wp.float64(0.0)

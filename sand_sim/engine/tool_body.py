@@ -38,7 +38,8 @@ class Tools:
         cell_starts: particles of cell k are ``cell_starts[k]`` to ``cell_starts[k + 1]``, int.
         shapes, states, tracks: structs of ``tools.py``, shape (tools,).
         travelled: bound of each tool's motion since the list was made, shape (tools,) [m].
-        wrench, impulse: force and torque of the sand now, and over the frame, vec3d, shape (tools, 2).
+        wrench: force and torque of the sand now, vec3d, shape (tools, 2).
+        impulse: of both over the frame, in the axes of the world, then in those of the tool, vec3d, shape (tools, 4).
         twist: velocity of the frame's origin and spin over the last step, world frame, vec3d, shape (tools, 2) [m/s], [rad/s].
         way: the same of the frame's origin and turn, vec3d, shape (tools, 2) [m], [rad].
         work: of the tool on the sand up to the middle of the last step, shape (tools,) [J].
@@ -84,7 +85,7 @@ class Tools:
         self.tracks = wp.zeros(self.number, dtype=ToolTrack, device=device)
         self.travelled = wp.zeros(self.number, dtype=wp.float64, device=device)
         self.wrench = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
-        self.impulse = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
+        self.impulse = wp.zeros((self.number, 4), dtype=wp.vec3d, device=device)
         self.twist = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
         self.way = wp.zeros((self.number, 2), dtype=wp.vec3d, device=device)
         self.work = wp.zeros(self.number, dtype=wp.float64, device=device)

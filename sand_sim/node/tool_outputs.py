@@ -84,12 +84,12 @@ class ToolOutputs:
 
     def _publish_wrenches(self, report: ToolReport, time: float) -> None:
         """Mean over the frame, and filtered: in the axes of the world, which do not turn, before it is turned into the tool's."""
-        wrench = np.array([report.world_force, rotation.rotate(report.orientation, report.torque)])
+        wrench = np.array([report.world_force, report.world_torque])
         filtered = self._filter_at(time, wrench)
         frame_id = self._parameters["frame_id"]
         if self._parameters[f"tools.{self._tool}.wrench_frame"] == "tool":
-            back = rotation.inverse(report.orientation)
-            frame_id, wrench, filtered = self._frame_id, rotation.rotate(back, wrench), rotation.rotate(back, filtered)
+            filtered = rotation.rotate(rotation.inverse(report.orientation), filtered)
+            frame_id, wrench = self._frame_id, (report.force, report.torque)
         self._wrench.publish(arrays_to_wrench(*wrench, time, frame_id))
         self._filtered.publish(arrays_to_wrench(*filtered, time, frame_id))
 

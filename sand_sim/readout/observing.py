@@ -138,7 +138,7 @@ def observe_tools(
         tracks: where the tools are going.
         cloud: the grains now.
         time: now [s].
-        means: force and torque on each tool since the last observation, world frame, shape (tools, 2, 3) [N], [N m].
+        means: wrenches on the tools since the last observation, from ``MeanWrenches``, shape (tools, 4, 3) [N], [N m].
         swept: volume that each tool has swept, shape (tools,) [m^3].
     """
     tools = assembly.solver.arrays.tools
@@ -148,8 +148,7 @@ def observe_tools(
     reports = []
     for index, (model, track) in enumerate(zip(assembly.tools, tracks, strict=True)):  # terrains come after the tools
         position, orientation = track.at(time)
-        back = rotation.inverse(orientation)
-        force, torque = means[index]
+        world_force, world_torque, force, torque = means[index].copy()
         reports.append(
             ToolReport(
                 name=model.tool.name,
@@ -157,9 +156,10 @@ def observe_tools(
                 orientation=orientation,
                 velocity=twist[index, 0],
                 spin=twist[index, 1],
-                force=rotation.rotate(back, force),
-                torque=rotation.rotate(back, torque),
-                world_force=force.copy(),
+                force=force,
+                torque=torque,
+                world_force=world_force,
+                world_torque=world_torque,
                 work=float(work[index]),
                 carried=float(cloud.mass[model.holds(cloud.position, position, orientation)].sum()),
                 swept=float(swept[index]),

@@ -2,7 +2,10 @@
 
 import numpy as np
 
+from sand_sim import rotation
+from sand_sim.engine.arrays import DemArrays
 from sand_sim.engine.tool_body import Tools
+from sand_sim.integrator import VERLET
 
 
 class MeanWrenches:
@@ -10,48 +13,61 @@ class MeanWrenches:
 
     Attributes:
         steps: done at the last observation.
-        wrench: on each tool then, force and torque about the tool frame's origin, world frame, shape (tools, 2, 3) [N], [N m];
-            None without tools.
+        wrench: on each tool then, force and torque about the tool frame's origin in the axes of the world, then the same in those
+            of the tool, shape (tools, 4, 3) [N], [N m]; None without tools.
 
     Args:
-        tools: of the world, None if there are none.
+        arrays: of the world.
+        turns: tool frames to world frame now, shape (tools, 4).
         now: steps done.
         steps, wrench: as above; of now if left out.
     """
 
-    def __init__(self, tools: Tools | None, now: int, steps: int | None = None, wrench: np.ndarray | None = None):
-        self.steps, self.wrench = now if steps is None else steps, wrench
+    def __init__(self, arrays: DemArrays, turns, now: int, steps: int | None = None, wrench: np.ndarray | None = None):
+        self.steps, self.wrench, tools = now if steps is None else steps, wrench, arrays.tools
         if tools:
-            self.wrench = tools.wrench.numpy().copy() if wrench is None else wrench
+            self.wrench = _in_both_axes(tools, turns) if wrench is None else wrench
             self._felt_steps, self._felt_impulse = np.full(tools.number, now), tools.impulse.numpy().copy()
 
-    def observe(self, tools: Tools | None, now: int, time_step: float, half_steps: bool) -> np.ndarray | None:
-        """Means since the last observation, those of now if no time has passed, shape (tools, 2, 3).
+    def observe(self, arrays: DemArrays, turns, now: int) -> np.ndarray | None:
+        """Means since the last observation, those of now if no time has passed, shape (tools, 4, 3), as ``wrench``.
 
         Args:
-            tools: with wrenches brought up to now.
+            arrays: with wrenches brought up to now.
+            turns: tool frames to world frame now, shape (tools, 4).
             now: steps done.
-            time_step: [s].
-            half_steps: whether the forces of now complete velocities by half a step.
         """
-        passed, self.steps = (now - self.steps) * time_step, now
+        tools, dt = arrays.tools, arrays.setting.dt
+        passed, self.steps = (now - self.steps) * dt, now
         if tools is None:
             return None
-        before, self.wrench = self.wrench, tools.wrench.numpy().copy()
+        before, self.wrench = self.wrench, _in_both_axes(tools, turns)
         if passed <= 0.0:
             return self.wrench
         impulse = tools.impulse.numpy().copy()
         tools.impulse.zero_()
         self._felt_impulse -= impulse
-        if half_steps:  # at both ends, so that means times time are exactly the momentum that the grains show
-            impulse += 0.5 * time_step * (self.wrench - before)
+        if arrays.recipe.integrator == VERLET:
+            # The half steps at both ends, so that means times time are exactly the momentum that the grains show.
+            impulse += 0.5 * dt * (self.wrench - before)
         return impulse / passed
 
-    def feel(self, tools: Tools, tool: int, now: int, time_step: float) -> np.ndarray:
-        """Mean on one tool over the steps since it was last felt, that of the last step if there is none, shape (2, 3)."""
-        passed, self._felt_steps[tool] = (now - self._felt_steps[tool]) * time_step, now
+    def feel(self, arrays: DemArrays, tool: int, now: int) -> np.ndarray:
+        """Mean on one tool over the steps since it was last felt, that of the last step if there is none, shape (2, 3).
+
+        Force and torque are in the axes of the world.
+        """
+        tools, passed = arrays.tools, (now - self._felt_steps[tool]) * arrays.setting.dt
+        self._felt_steps[tool] = now
         if passed <= 0.0:
             return tools.wrench.numpy()[tool].copy()
         impulse = tools.impulse.numpy()[tool].copy()
         gained, self._felt_impulse[tool] = impulse - self._felt_impulse[tool], impulse
-        return gained / passed
+        return gained[:2] / passed
+
+
+def _in_both_axes(tools: Tools, turns) -> np.ndarray:
+    """Wrenches of now in the axes of the world and of the tools, shape (tools, 4, 3)."""
+    wrenches = tools.wrench.numpy()
+    own = [rotation.rotate(rotation.inverse(turn), wrench) for turn, wrench in zip(turns, wrenches, strict=True)]
+    return np.concatenate([wrenches, np.array(own)], axis=1)
