@@ -137,7 +137,7 @@ class ToolReport:
         velocity: of the origin over the last step, shape (3,) [m/s].
         spin: over the last step, shape (3,) [rad/s].
         force, torque: of the sand about its frame's origin, means over the frame in axes that turn with it, (3,) [N], [N m].
-        world_force, world_torque: the same in the axes of the world.
+        world_force, world_torque: the same in the axes of the world, shape (3,) [N], [N m].
         work: of the tool on the sand since the start [J].
         carried: mass of the grains whose centres are inside the tool's bounding box [kg].
         swept: ground below the bed's first surface that it has passed through since the start, in cells a grain wide [m^3].
