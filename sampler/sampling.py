@@ -81,9 +81,10 @@ def sample_body(
     progress(0.0)  # compiling, mending, and cutting parts that cross may take a while
     load_kernels(device, partial(progress, 0.0))
     repaired = mesh if isinstance(mesh, RepairedMesh) else repair_mesh(mesh, sheets)
-    thickness = 2.0 * radius if thickness is None else thickness
+    thickness, told = 2.0 * radius if thickness is None else thickness, list(repaired.report.warnings)
     if np.any(repaired.kind == SHEET):
         check_thickness(thickness, radius, repaired.diagonal)
+        told.append(f"sheets count as {thickness:.3g} m thick, half of it on either side, so openings in them are narrower")
     check_scale(repaired.triangles, radius, _spacing(radius, spacing, count, grain, repaired.triangles))
     closed, owner = closed_triangles(repaired, thickness)
     fine = _spacing(radius, spacing, count, grain, closed)
@@ -137,7 +138,7 @@ def sample_body(
         thinnest_wall=thinnest_wall(around),
         evenness=evenness,
         steps=dict(repaired.report.steps),
-        warnings=(*repaired.report.warnings, *doubtful),
+        warnings=(*told, *doubtful),
         mass_warnings=tuple(doubts),
     )
 

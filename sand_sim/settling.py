@@ -108,6 +108,11 @@ def _come_to_rest(assembly: Assembly, doubts: tuple[str, ...], progress: Progres
             f"settle: grains are slow after {asked.time:g} s, but what bears them differs from their weight by "
             f"{100.0 * unborne:.2g} %: they fall or spring; give it more time"
         ]
+    if slow:
+        return [
+            f"settle: grains have been slower than {asked.speed:g} m/s for only {slow:.2g} s after {asked.time:g} s, not for the "
+            f"{turning:.2g} s in which those that begin to fall are slow, too; give it more time"
+        ]
     return [
         f"settle: grains still move at {speed:.2g} m/s (root mean square) after {asked.time:g} s, speed {asked.speed:g} m/s was "
         "asked; give it more time or ask for less"

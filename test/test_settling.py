@@ -110,6 +110,15 @@ def test_the_speed_that_is_told_is_that_of_the_kinetic_energy_and_all_the_time_i
     assert world.observe().grains.position[0, 0] == pytest.approx(0.009, rel=0.01)
 
 
+def test_grains_that_have_been_slow_for_too_short_a_time_are_told_of(make_world):
+    """A grain that begins to fall is slower than 1 m/s for 0.1 s; only after twice that time it is known to rest."""
+    further = {"gravity": [0.0, 0.0, -GRAVITY], "settle": {"time": 0.08, "speed": 1.0, "fall": "free"}, "domain": WIDE}
+    world = make_world([[0.0, 0.0, 0.0]], 0.005, **further)
+    assert world.warnings[0].startswith(
+        "settle: grains have been slower than 1 m/s for only 0.08 s after 0.08 s, not for the 0.2 s"
+    )
+
+
 def test_a_grain_that_bounces_for_ever_never_rests(make_world):
     """Slow at each of its four heights, 20 ms as long as it takes to turn, and not 80 ms."""
     settle = {"time": 0.5, "speed": 0.1, "fall": "free"}

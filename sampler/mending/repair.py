@@ -258,6 +258,4 @@ def _warn(report: RepairReport, share: float, clashes: int) -> None:
     if clashes:
         report.warnings.append(f"{clashes} edges join faces that cannot be oriented consistently (one-sided or self-touching)")
     if report.steps["sheets"]:
-        report.warnings.append(
-            f"{report.steps['sheets']} components are open surfaces; they are taken for sheets and get a thickness"
-        )
+        report.warnings.append(f"{report.steps['sheets']} components are open surfaces; they are taken for sheets")

@@ -96,9 +96,9 @@ def model_ground(boundary: Boundary, folder: Path, progress: Callable[[float], N
         mesh.vertices = rotation.rotate(np.asarray(terrain.pose.orientation), mesh.vertices) + terrain.pose.position
         place = mesh.bounds.mean(axis=0)
         mesh.vertices = mesh.vertices - place
-        body = sample_body(mesh, terrain.particle_radius, progress=progress)
+        body = sample_body(mesh, terrain.particle_radius, thickness=terrain.thickness, sheets=terrain.sheets, progress=progress)
         if terrain.heights:
-            body = replace(body, warnings=tuple(told for told in body.warnings if "taken for sheets" not in told))  # of course
+            body = replace(body, warnings=tuple(told for told in body.warnings if "sheets" not in told))  # of course
     except (MeshError, SceneError) as error:
         raise SceneError(f"boundaries: {source} of terrain '{boundary.name}': {error}") from None
     surface = outward_triangles(body.triangles) if terrain.contact == SMOOTH else None

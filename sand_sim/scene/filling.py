@@ -59,7 +59,7 @@ def fill_grains(
     reach = shape.bounding_radius / shape.equal_radius if shape else 1.0
     largest = _largest(fill.size) * reach
     points = _lattice(fill, largest, random)
-    places, taken = len(points), []
+    lattice, places, taken = points, len(points), []
     obstacles = [(wall.label, partial(_clear, wall)) for wall in walls]
     obstacles += [(f"fill '{name}'", partial(_clear_of_grains, table)) for name, table in others]
     for label, is_clear in obstacles:
@@ -76,6 +76,8 @@ def fill_grains(
     except TooManyPairsError as error:
         raise SceneError(f"fills: '{fill.name}' shares too large a region with other fills: {error}") from None
     if wanted > room:
+        alone = [(wall.label, places - int(_clear(wall, lattice, largest).sum())) for wall in walls]  # whatever others take
+        taken[: len(walls)] = alone
         cause = "".join(f"; {what} takes {some} of its {places} places" for what, some in taken if 2 * some > places)
         times = wanted / room + 0.1 if room and not cause else np.inf
         enough = f", about {times:.1f} times as high," if times < _HIGHER else ""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from sand_sim.scene.fields import Field
 from sand_sim.scene.reading_poses import read_pose
-from sand_sim.scene.types import ROUGH, SMOOTH, Boundary, Drive, Rough, Terrain, Vector
+from sand_sim.scene.types import ROUGH, SHEETS, SMOOTH, Boundary, Drive, Rough, Terrain, Vector
 
 _SIDES = ("left", "right", "front", "back", "bottom", "top")
 _LATTICES = ("triangular", "square")
@@ -29,7 +29,7 @@ _OPTIONAL = {
     "cone": ("height", "angle", "rough", "grains"),
     "hole_plate": ("rough",),
     "plunger": ("radius", "velocity", "force", "mass", "max_speed", "travel", "rough"),
-    "terrain": ("mesh", "heights", "spacing", "contact", "scale", "pose"),
+    "terrain": ("mesh", "heights", "spacing", "contact", "scale", "thickness", "sheets", "pose"),
 }
 FASTEST = 1e4  # [m/s] of plungers and tools: faster ones leave no time step
 _HEIGHT_FILES = (".npz", ".csv", ".png")
@@ -46,7 +46,8 @@ def read_boundary(entry: Field, folder: Path) -> Boundary:
         SceneError: naming the field and how to mend it.
     """
     anything = {key for fields in (*_NEEDED.values(), *_OPTIONAL.values()) for key in fields}
-    kind = entry.keys((*_COMMON, *sorted(anything)), ("type", "material"))["type"].choice(_NEEDED)
+    typed = isinstance(entry.value, dict) and "type" in entry.value  # which decides what else is known
+    kind = entry.keys(entry.value if typed else (*_COMMON, *sorted(anything)), ("type", "material"))["type"].choice(_NEEDED)
     entry.keys((*_COMMON, *_NEEDED[kind], *_OPTIONAL[kind]), _NEEDED[kind])
     common = {
         "kind": kind,
@@ -146,7 +147,12 @@ def _terrain(entry: Field, folder: Path) -> Terrain:
     if "mesh" in entry:
         if "spacing" in entry:
             raise entry["spacing"].refuse("goes with 'heights', it is that of their grid")
+        common["thickness"] = entry.optional("thickness", _length, None)
+        common["sheets"] = entry.optional("sheets", lambda f: f.choice(SHEETS), Terrain.sheets)
         return Terrain(mesh=entry["mesh"].text(), **common)
+    for field in ("thickness", "sheets"):
+        if field in entry:
+            raise entry[field].refuse("goes with 'mesh'; ground made of heights is solid below")
     if "spacing" not in entry:
         raise entry.refuse("the field 'spacing' [m], of the grid of heights, is missing")
     path = entry["heights"].file(folder)

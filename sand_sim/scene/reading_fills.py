@@ -67,11 +67,13 @@ def _size(entry: Field) -> SizeDistribution:
                 f"at least {_FEWEST:g} must; move 'low' and 'high' apart, or nearer to the mean"
             )
     elif "table" in entry.value:
-        table = entry.keys(("table",))["table"].keys(("radii", "weights"), ("radii", "weights"))
+        table = entry.keys(("table",))["table"].keys(("radii", "weights", "by"), ("radii", "weights"))
         radii = tuple(r.number(above=0.0, unit="m") for r in table["radii"].entries())
         weights = tuple(w.number(least=0.0) for w in table["weights"].entries())
         if len(radii) != len(weights) or not sum(weights):
             raise table.refuse("needs as many weights as radii, and not all of them zero")
+        if table.optional("by", lambda f: f.choice(("number", "mass")), "number") == "mass":
+            weights = tuple(weight * (radii[0] / radius) ** 3 for weight, radius in zip(weights, radii, strict=True))
         return SizeDistribution("table", radii=radii, weights=weights)
     else:
         raise entry.refuse("must be a radius [m], or one of 'uniform', 'normal', 'table'")

@@ -113,6 +113,8 @@ class Terrain:
     spacing: float = 0.0  # [m] of the grid
     contact: str = ROUGH  # or SMOOTH
     scale: float = 1.0  # [m per unit] of the mesh, or of the heights
+    thickness: float | None = None  # [m] of sheets in the mesh; None: two particle radii
+    sheets: str = "auto"  # of the mesh, which open components are sheets
     pose: Pose = Pose()
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 from scenes import SceneMaker
 
@@ -45,6 +46,18 @@ def write_heights(folder, kind):
     levels = np.rint(valley()[::-1] / 0.1 * 65535.0).astype(np.uint16)  # the upper edge of a map is far along y
     Image.fromarray(levels).save(path)
     return path.name, 0.1
+
+
+@pytest.mark.parametrize(("thickness", "half"), [(None, 0.003), (0.001, 0.0005)])
+def test_an_open_mesh_is_as_thick_as_is_said(make_ground, tmp_path, thickness, half):
+    """A level sheet of two triangles: a grain rests half a thickness above it, two particle radii if nothing is said."""
+    corners = [[-0.1, -0.1, 0.0], [0.1, -0.1, 0.0], [0.1, 0.1, 0.0], [-0.1, 0.1, 0.0]]
+    trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]]).export(tmp_path / "sheet.stl")
+    terrain = {"mesh": "sheet.stl", "contact": "smooth", "spacing": None, "thickness": thickness}
+    world = make_ground([[0.0, 0.0, RADIUS + half]], terrain)
+    world.step(round(0.1 / world.time_step))
+    assert world.observe().grains.position[0, 2] == pytest.approx(RADIUS + half, abs=1e-5)  # which its weight presses in
+    assert any(f"sheets count as {2.0 * half:.3g} m thick" in warning for warning in world.warnings)
 
 
 def test_the_lowest_row_of_a_picture_is_the_first(tmp_path):

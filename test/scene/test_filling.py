@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,9 @@ import yaml
 from scenes import SceneMaker, floor, write_small_scene
 
 from sand_sim import SceneError, World, read_scene
+from sand_sim.scene.fields import Field
 from sand_sim.scene.filling import fill_grains
+from sand_sim.scene.reading_fills import read_fill
 from sand_sim.scene.types import Fill, Material, SizeDistribution
 from sand_sim.scene.walls import Wall
 
@@ -53,6 +56,17 @@ def test_sizes_follow_their_distribution(size, low, high, mean):
     radius = fill_grains(fill(size=size, count=1000, high=(0.2, 0.2, 0.2)), SAND, 0, []).radius
     assert low <= radius.min() < radius.max() <= high
     assert radius.mean() == pytest.approx(mean, rel=0.02)
+
+
+def test_a_table_by_mass_is_what_sieves_leave():
+    """A third of the mass in fine grains of half the radius: there are four of them for each coarse one."""
+    table = {"radii": [0.002, 0.004], "weights": [1.0, 2.0], "by": "mass"}
+    region = {"low": [0, 0, 0], "high": [0.2, 0.2, 0.2]}
+    entry = {"material": "sand", "radius": {"table": table}, "region": region, "count": 5000}
+    radius = fill_grains(read_fill(Field(entry, "fills[0]"), Path.cwd()), SAND, 0, []).radius
+    assert np.sum(radius[radius < 0.003] ** 3) / np.sum(radius**3) == pytest.approx(1.0 / 3.0, abs=0.02)
+    with pytest.raises(SceneError, match=r"table.by: unknown 'volume'; known are number, mass"):
+        read_fill(Field(entry | {"radius": {"table": table | {"by": "volume"}}}, "fills[0]"), Path.cwd())
 
 
 def test_a_normal_distribution_is_cut_where_it_is_said_to_be():
@@ -171,6 +185,19 @@ def test_what_takes_the_room_of_the_grains_is_named(tmp_path):
     scene["fills"] = [{"material": "sand", "radius": 0.005, "region": {"low": [0, 0, 0], "high": [0.1, 0.1, 0.1]}, "count": 50}]
     scene["tools"]["plate"]["particle_radius"] = 3
     with pytest.raises(SceneError, match=r"room for 0 loosely packed .* wanted; tool 'plate' takes 729 of its 729 places"):
+        World(read_scene(scene, tmp_path))
+
+
+@pytest.mark.parametrize("width", [0.1, 0.06])
+def test_a_region_behind_a_side_of_a_second_box_is_told_so(tmp_path, width):
+    """Its sides go on for ever; also where others of them take a part of the places first."""
+    boxes = [
+        {"name": name, "type": "box", "material": "steel", "low": [x, y, 0.0], "high": [x + 0.1, y + wide, 0.1], "open": ["top"]}
+        for name, x, y, wide in (("one", 0.0, 0.0, 0.1), ("two", 0.11, 0.05 - 0.5 * width, width))
+    ]
+    fills = [{"material": "sand", "radius": 0.005, "region": {"low": [0, 0, 0], "high": [0.1, 0.1, 0.1]}, "count": 50}]
+    scene = yaml.safe_load(write_small_scene(tmp_path, boundaries=boxes, fills=fills, tools={}).read_text())
+    with pytest.raises(SceneError, match=r"'two/back' takes 729 of its 729 places; .*'region' lies behind it: .* of a 'bin'"):
         World(read_scene(scene, tmp_path))
 
 

@@ -83,6 +83,12 @@ def test_plungers_and_terrains_need_names_of_their_own():
         (TERRAIN | {"mesh": "a.stl", "spacing": 1}, "boundaries[0].spacing: goes with 'heights'"),
         (TERRAIN | {"mesh": "a.stl", "particle_radius": 0}, "boundaries[0].particle_radius: must be greater than 0 [m]"),
         (TERRAIN | {"mesh": "a.stl", "rough": {}}, "boundaries[0]: unknown field 'rough'"),
+        (
+            TERRAIN | {"mesh": "a.stl", "speed": 1},
+            "boundaries[0]: unknown field 'speed'; known fields are type, material, name, particle_radius, mesh, heights",
+        ),
+        (TERRAIN | {"heights": "a.csv", "spacing": 1, "thickness": 0.1}, "boundaries[0].thickness: goes with 'mesh'"),
+        ({"typ": "plane", "material": "steel"}, "boundaries[0]: unknown field 'typ'; did you mean 'type'?"),
     ],
 )
 def test_refusals_name_the_field_and_the_fix(entry, named):
