@@ -10,6 +10,7 @@ from sand_sim.changes.body_placing import put_body, read_body
 from sand_sim.changes.body_pushing import push
 from sand_sim.changes.carrying_over import carry_over, rebuild
 from sand_sim.changes.exchange import check_room, find_grains, read_grains
+from sand_sim.changes.plunger_driving import drive
 from sand_sim.changes.tool_exchange import check_tool, read_tool
 from sand_sim.changes.tool_placing import check_place, forget_motion
 from sand_sim.grain_table import GrainTable
@@ -151,6 +152,23 @@ class Changeable:
             CommandError: if there is no such body, it has left the domain, or the numbers make no sense; nothing is changed then.
         """
         push(self.assembly, body, force, torque)
+
+    def drive_plunger(
+        self, plunger: str, force: float | None = None, velocity: float | None = None, max_speed: float | None = None
+    ) -> None:
+        """Press a plunger with another force, or move or hold it at a velocity, from now on; ``reset`` brings the first one back.
+
+        Args:
+            plunger: name.
+            force: along its normal [N]; its mass is the scene's, that of all grains where none is given there.
+            velocity: instead of it, along its normal [m/s]; 0 holds it.
+            max_speed: with a force, how fast the plunger gets at most [m/s]; as it is if None.
+
+        Raises:
+            CommandError: if there is no such plunger, or the numbers make no sense; nothing is changed then.
+        """
+        self._health()
+        drive(self.assembly, plunger, force, velocity, max_speed)
 
     def _go_on_with(self, assembly: Assembly) -> None:
         """Go on with other grains or tools, after a moment in which no time has passed.

@@ -106,7 +106,7 @@ def _whole_arrays(arrays: DemArrays) -> dict[str, wp.array]:
         names = ("tracks", "states", "travelled", "wrench", "impulse", "twist", "way", "work")
         found |= {f"tools.{name}": getattr(tools, name) for name in names}
     if arrays.plungers:
-        found |= {f"plungers.{name}": getattr(arrays.plungers, name) for name in ("states", "engaged")}
+        found |= {f"plungers.{name}": getattr(arrays.plungers, name) for name in ("drives", "states", "engaged")}
     return {name: array for name, array in found.items() if array is not None}
 
 

@@ -44,6 +44,7 @@ class ChangeServices:
             ("set_tool_mesh", {"tool": _TEXT, "mesh": _TEXT}, {"scale": _NUMBER}, self._set_mesh),
             ("place_tool", {"tool": _TEXT, "position": _NUMBERS}, {"orientation": _NUMBERS}, self._place),
             ("place_body", {"body": _TEXT, "position": _NUMBERS}, dict.fromkeys(_OF_BODY, _NUMBERS), self._put),
+            ("drive_plunger", {"plunger": _TEXT}, dict.fromkeys(("force", "velocity", "max_speed"), _NUMBER), self._drive),
             ("push_body", {"body": _TEXT}, dict.fromkeys(("force", "torque"), _NUMBERS), self._push),
         ):
             connections.service(SetParametersAtomically, f"~/{name}", self._answering(needed, optional, ask))
@@ -126,6 +127,13 @@ class ChangeServices:
         def act() -> str:
             self._world.push_body(body, **wrench)
             return f"body '{body}' is pushed"
+
+        return self._simulation.request(act)
+
+    def _drive(self, plunger: str, **how: float):
+        def act() -> str:
+            self._world.drive_plunger(plunger, **how)
+            return f"plunger '{plunger}' is driven"
 
         return self._simulation.request(act)
 
