@@ -152,6 +152,8 @@ def test_clumps_of_a_fill_are_not_pushed_in_place_of_a_body(make_bodies):
         ("wheel", [0.0] * 3, "body 'wheel' is unknown; known are ball"),
         ("ball", [0.0] * 2, "body 'ball': force must be 3 numbers"),
         ("ball", [0.0, 0.0, np.nan], "body 'ball': force must be finite"),
+        ("ball", [0.0, 0.0, 1e6], "body 'ball': would be torn away by"),
+        ("ball", [0.0, 0.0, 1e300], "body 'ball': would be torn away by"),
     ],
 )
 def test_a_push_that_makes_no_sense_is_refused(make_bodies, body, force, told):

@@ -29,6 +29,22 @@ def position_of(client, node):
     return node.simulation.request(node.simulation.world.observe).result(30.0).grains.position
 
 
+def test_plungers_are_driven_otherwise(client, start_node):
+    """In lockstep, so that from the answer on all steps are driven so."""
+    lid = {"type": "plunger", "name": "lid", "material": "steel", "point": [0, 0, 0.2], "normal": [0, 0, -1], "velocity": 0.0}
+    floor = {"name": "floor", "type": "plane", "material": "steel", "point": [0, 0, 0], "normal": [0, 0, 1]}
+    node = start_node({"boundaries": [floor, lid]}, pacing="lockstep")
+    client.connect()
+    assert ask(client, "drive_plunger", plunger="lid", velocity=0.1) == (True, "plunger 'lid' is driven")
+    assert client.call(Trigger, "step").success
+    seen = node.simulation.request(node.simulation.world.observe).result(30.0)
+    assert seen.wall("lid").position[2] == pytest.approx(0.2 - 0.1 * seen.time, abs=1e-9)
+    assert ask(client, "drive_plunger", plunger="lid") == (
+        False,
+        "plunger 'lid': give exactly one of 'force' [N] and 'velocity' [m/s]",
+    )
+
+
 def test_states_are_saved_and_loaded(client, start_node, tmp_path):
     node = start_node(pacing="lockstep", states=str(tmp_path / "kept"))
     client.connect()

@@ -177,6 +177,8 @@ def test_any_argument_of_a_service(client, start_node, tmp_path, examples):
         "set_tool_mesh": ["tool", "mesh", "scale"],
         "place_tool": ["tool", "position", "orientation"],
         "place_body": ["body", "position", "orientation", "velocity", "spin"],
+        "push_body": ["body", "force", "torque"],
+        "drive_plunger": ["plunger", "force", "velocity", "max_speed"],
         "load_state": ["name"],
     }
     text = st.one_of(
