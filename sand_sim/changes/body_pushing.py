@@ -19,8 +19,8 @@ def push(assembly: Assembly, name: str, force, torque) -> None:
         torque: about that origin, world frame, shape (3,) [N m].
 
     Raises:
-        CommandError: if there is no such body, it has left the domain, or the numbers make no sense or would tear it away, by half
-            the radius of a sphere of it in one step; nothing is changed then.
+        CommandError: if there is no such body, it has left the domain, or the numbers make no sense, or tear it away by half
+            the radius of a sphere in one step; nothing is changed then.
     """
     index, label = find_body(assembly, name), f"body '{name}'"
     force, torque = read_numbers(f"{label}: force", force, 3), read_numbers(f"{label}: torque", torque, 3)
