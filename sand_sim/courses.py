@@ -24,10 +24,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sand_sim.border import CommandError, ToolPose, ToolVelocity
-from sand_sim.tool_motion.commands import Command
+from sand_sim.tool_motion.commands import Command, in_world
 from sand_sim.world import World
 
 _MOST_WAITING = 100_000
+_LESS_THAN_HALF = 3.0  # [rad] of a turn
 
 
 @dataclass(frozen=True)
@@ -158,7 +159,11 @@ class Courses:
         for name, course in self.by_tool.items():
             while course.waiting and self._world.resting(name):
                 try:
-                    self._world.apply(self._as_pose(course.waiting.popleft()))
+                    command = course.waiting.popleft()
+                    if isinstance(command, ToolVelocity):
+                        self._move(course, command, command.time)
+                    else:
+                        self._world.apply(command)
                     break
                 except CommandError as error:
                     reject(error)
@@ -263,7 +268,8 @@ class Courses:
         self._begin_there(command)
         course, now, rules = self.by_tool[command.tool], self._world.time, self.rules
         if isinstance(command, ToolVelocity):
-            target, interval = self._pose_within_reach(command, rules.hold), rules.hold
+            course.waiting.clear()
+            self._move(course, self._within_reach(command), now + rules.hold)
         else:
             if command.time is None:
                 since = now - course.last_taken
@@ -271,9 +277,8 @@ class Courses:
                 since = self._world.arrival(command.tool) - course.last_taken  # as the one whose place it takes
             else:
                 since = command.time - course.followed_stamp
-            target, interval = command, max(min(since, rules.gap), self._world.time_step)
-        self._reach(target, now + interval)
-        course.waiting.clear()
+            self._reach(command, now + max(min(since, rules.gap), self._world.time_step))
+            course.waiting.clear()
         course.promised, course.last_taken = -np.inf, now
         if command.time is None:
             course.last_stamp = min(course.last_stamp, now)  # later ones have been discarded
@@ -290,18 +295,27 @@ class Courses:
             self.limited += 1
             self.delays[pose.tool] = max(self.delays.get(pose.tool, 0.0), now + soonest - end)
 
-    def _pose_within_reach(self, velocity: ToolVelocity, duration: float) -> ToolPose:
-        """Where a velocity leads, made smaller in its direction if it is above ``max_speed``."""
+    def _move(self, course: Course, velocity: ToolVelocity, end: float) -> None:
+        """Move a tool at a velocity until a time [s], by less than half a turn at once: poses are reached the short way."""
+        now = self._world.time
+        soon = min(end, now + _unambiguous(velocity))
+        pose = self._world.pose_after(velocity, soon - now)
+        self._world.apply(replace(pose, time=soon))
+        if soon < end:
+            begun = self._world.pose_after(ToolVelocity(velocity.tool, np.zeros(3), np.zeros(3)), soon - now)
+            course.waiting.appendleft(replace(in_world(velocity, begun.orientation), time=end))
+
+    def _within_reach(self, velocity: ToolVelocity) -> ToolVelocity:
+        """A velocity, made smaller in its direction if it is above ``max_speed``."""
+        duration = min(self.rules.hold, _unambiguous(velocity))
         target = self._world.pose_after(velocity, duration)
         excess = self._world.travel(target) / (duration * self._world.scene.tool(velocity.tool).max_speed)
         if excess <= 1.0:
-            return target
+            return velocity
         self.limited += 1
-        return self._world.pose_after(
-            replace(velocity, linear=velocity.linear / excess, angular=velocity.angular / excess), duration
-        )
+        return replace(velocity, linear=velocity.linear / excess, angular=velocity.angular / excess)
 
-    def _as_pose(self, command: Command) -> ToolPose:
-        if isinstance(command, ToolPose):
-            return command
-        return replace(self._world.pose_after(command, command.time - self._world.time), time=command.time)
+
+def _unambiguous(velocity: ToolVelocity) -> float:
+    """Time in which it turns a tool by a little less than half a turn [s]."""
+    return _LESS_THAN_HALF / max(float(np.linalg.norm(velocity.angular)), 1e-300)

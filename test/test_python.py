@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scenes import write_small_scene
 
-from sand_sim import CommandError, SceneError, ToolPose, World, load_scene
+from sand_sim import CommandError, SceneError, ToolPose, ToolVelocity, World, load_scene
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +47,14 @@ def test_poses_of_another_shape_are_refused(world, position, orientation, told):
 def test_a_time_that_is_no_number_is_refused(world):
     with pytest.raises(CommandError, match="position, orientation and time must be numbers"):
         world.apply(ToolPose("plate", np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 0.0, 1.0]), "soon"))
+
+
+def test_half_a_turn_at_once_is_refused_with_how_far_to_go(world):
+    """No pose tells which way round it is reached."""
+    spin = ToolVelocity("plate", np.zeros(3), np.array([0.0, 0.0, 20.0]))
+    with pytest.raises(CommandError, match=r"half a turn or more in 0.2 s, .*; go by less than 0.157 s at once"):
+        world.pose_after(spin, 0.2)
+    assert world.pose_after(spin, 0.15).orientation == pytest.approx([0.0, 0.0, np.sin(1.5), np.cos(1.5)])
 
 
 @pytest.mark.parametrize(

@@ -61,10 +61,21 @@ def pose_after(velocity: ToolVelocity, position: np.ndarray, orientation: np.nda
     Raises:
         CommandError: if it is half a turn or more.
     """
-    linear, angular = velocity.linear, velocity.angular
-    if velocity.in_tool_frame:
-        linear, angular = rotation.rotate(orientation, linear), rotation.rotate(orientation, angular)
-    if not np.linalg.norm(angular) * duration < np.pi:
-        raise CommandError("too_fast", f"tool '{velocity.tool}': angular velocity makes half a turn within {duration:.3g} s")
-    turned = rotation.multiply(rotation.from_vector(angular * duration), orientation)
-    return ToolPose(velocity.tool, position + linear * duration, turned)
+    velocity = in_world(velocity, orientation)
+    if not np.linalg.norm(velocity.angular) * duration < np.pi:
+        least = np.pi / np.linalg.norm(velocity.angular)
+        raise CommandError(
+            "too_fast",
+            f"tool '{velocity.tool}': turns by half a turn or more in {duration:.3g} s, and goes to poses the shorter way round; "
+            f"go by less than {least:.3g} s at once",
+        )
+    turned = rotation.multiply(rotation.from_vector(velocity.angular * duration), orientation)
+    return ToolPose(velocity.tool, position + velocity.linear * duration, turned)
+
+
+def in_world(velocity: ToolVelocity, orientation: np.ndarray) -> ToolVelocity:
+    """A velocity in the world frame; ``orientation`` is that of the tool where the command begins."""
+    if not velocity.in_tool_frame:
+        return velocity
+    linear, angular = (rotation.rotate(orientation, vector) for vector in (velocity.linear, velocity.angular))
+    return replace(velocity, linear=linear, angular=angular, in_tool_frame=False)
