@@ -56,6 +56,9 @@ def summary_text(summary: dict) -> str:
             continue
         rows.append((f"{name}: peak draft", f"{tool['peak_draft_N']:.1f} N"))
         rows.append((f"{name}: peak lift", f"{tool['peak_lift_N']:.1f} N"))
+        for name_of, opposite in (("pull", "draft"), ("bearing", "lift")):  # what matters of wheels and plates
+            if tool[f"peak_{name_of}_N"] > tool[f"peak_{opposite}_N"]:
+                rows.append((f"{name}: peak {name_of}", f"{tool[f'peak_{name_of}_N']:.1f} N"))
         rows.append((f"{name}: peak torque", f"{tool['peak_torque_Nm']:.3g} N m"))
         if "carried_kg" in tool:
             weight = tool["carried_weight_N"]

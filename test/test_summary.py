@@ -1,5 +1,6 @@
 """What a run comes down to: peaks of forces against a tool's motion, and what it carried and lost on the way."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -32,6 +33,11 @@ def test_draft_is_against_the_motion_lift_is_down_and_what_is_lost_is_spilled(tm
     assert told["peak_force_N"] == pytest.approx(50.16, abs=0.01)
     assert told["peak_draft_N"] == pytest.approx(5.0)
     assert told["peak_lift_N"] == pytest.approx(6.0)
+    assert told["peak_pull_N"] == pytest.approx(20.0)
+    assert told["peak_bearing_N"] == pytest.approx(9.0)
+    text = summary_text(log.summarise())
+    assert re.search("plate: peak pull +20.0 N", text), "as it is more than the draft"
+    assert re.search("plate: peak bearing +9.0 N", text)
     assert told["peak_torque_Nm"] == pytest.approx(5 * 0.5)
     assert told["carried_kg"] == pytest.approx(0.6)
     assert told["spilled_kg"] == pytest.approx(0.9 - 0.6)

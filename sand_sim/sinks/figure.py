@@ -87,7 +87,7 @@ def _draw_curves(figure, columns: dict[str, np.ndarray], log: RunLog) -> None:
         rows[0].legend(fontsize=8, ncols=3)
         for name in names:
             rows[2].plot(time, columns[f"{name}.carried"], lw=1.4, label=name)
-        rows[2].set_ylabel("mass in the tool [kg]")
+        rows[2].set_ylabel("mass in the tool's\nbounding box [kg]")
         rows[2].legend(fontsize=8, ncols=3)
     else:
         rows[0].plot(time, columns["kinetic"], lw=1.2)

@@ -19,7 +19,7 @@ _PEAKS_OF_HEALTH = "momentum_residual", "gained"
 _OF_HEALTH = ("contacts", "deepest", "kinetic", "dissipated", "momentum_residual")
 _OF_TOOL = {name: name for name in ("position", "orientation", "velocity", "torque", "carried")} | {"force": "world_force"}
 _OF_PLUNGER = ("position", "force")
-_LOADS = ("force_N", "draft_N", "lift_N", "torque_Nm")  # of which a tool's peaks are kept
+_LOADS = "force_N", "draft_N", "pull_N", "lift_N", "bearing_N", "torque_Nm"
 
 
 @dataclass(frozen=True)
@@ -224,12 +224,12 @@ class RunLog:
 def _loads_of(tool: ToolReport) -> dict[str, float]:
     """What a tool bears now.
 
-    Draft is the force against its horizontal motion, lift the downward force of the sand that lifting has to overcome;
-    torque is about the origin of the tool's frame.
+    Draft is the force against its horizontal motion and pull that along it, as a wheel's; lift is the downward force of the sand
+    that lifting has to overcome and bearing the upward one; torque is about the origin of the tool's frame.
     """
     along, force = tool.velocity[:2], tool.world_force
     draft = -force[:2] @ along / max(np.linalg.norm(along), _STILL)
-    loads = np.linalg.norm(force), draft, -force[2], np.linalg.norm(tool.torque)
+    loads = np.linalg.norm(force), draft, -draft, -force[2], force[2], np.linalg.norm(tool.torque)
     return dict(zip(_LOADS, map(float, loads), strict=True))
 
 
