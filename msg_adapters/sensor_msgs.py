@@ -1,11 +1,11 @@
-"""``sensor_msgs``: grains and contacts as point clouds, heights as an image."""
+"""``sensor_msgs``: grains and contacts as point clouds, heights as an image, joint states."""
 
 import array
 
 import numpy as np
-from sensor_msgs.msg import Image, PointCloud2, PointField
+from sensor_msgs.msg import Image, JointState, PointCloud2, PointField
 
-from msg_adapters.builtin_interfaces import time_to_stamp
+from msg_adapters.builtin_interfaces import stamp_to_time, time_to_stamp
 from sand_sim.border import GrainCloud
 
 _TYPES = {"<f4": PointField.FLOAT32, "<u4": PointField.UINT32}
@@ -96,3 +96,15 @@ def _bytes_of(values: np.ndarray) -> array.array:
     data = array.array("B")
     data.frombytes(values.view(np.uint8))
     return data
+
+
+def joints_to_values(message: JointState) -> tuple[dict[str, float], float]:
+    """Values of joints by their names [rad or m], of those that have one, and the time they are of [s]."""
+    return dict(zip(message.name, message.position, strict=False)), stamp_to_time(message.header.stamp)
+
+
+def values_to_joints(values: dict[str, float], time: float) -> JointState:
+    """The opposite of ``joints_to_values``."""
+    message = JointState(name=list(values), position=[float(value) for value in values.values()])
+    message.header.stamp = time_to_stamp(time)
+    return message

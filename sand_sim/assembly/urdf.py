@@ -3,7 +3,7 @@
 Source: http://wiki.ros.org/urdf/XML.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -11,32 +11,14 @@ from xml.parsers import expat
 import numpy as np
 
 from sand_sim import rotation
+from sand_sim.assembly.joint import FIXED, FLOATING, JOINTS, Joint
 from sand_sim.border import Frame
 from sand_sim.scene.types import SceneError
 from sand_sim.showing import shown
 
 _LARGEST = 10_000_000  # bytes
 _MOST_ELEMENTS, _DEEPEST = 200_000, 100
-FIXED = "fixed"
-_JOINTS = (FIXED, "revolute", "continuous", "prismatic", "floating", "planar")
 _XACRO = "is not expanded yet; run: xacro file.xacro > file.urdf"
-
-
-@dataclass(frozen=True)
-class Joint:
-    """How a link hangs on another one when all joints are at zero.
-
-    Attributes:
-        kind: ``fixed``, or that of a movable one.
-        parent: name of the link it hangs on.
-        position: of the link's frame in the parent's, shape (3,) [m].
-        orientation: link's frame to parent's, shape (4,).
-    """
-
-    kind: str
-    parent: str
-    position: np.ndarray
-    orientation: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -82,6 +64,27 @@ class Robot:
         fixed = {name: joint for name, joint in self.joints.items() if joint.kind == FIXED}
         hung = [(name, fixed[name]) for name in _below(self.root, fixed)]
         return [Frame(name, joint.parent, joint.position, joint.orientation) for name, joint in hung]
+
+    def frames_at(self, values: dict[str, float], time: float | None) -> list[Frame]:
+        """Frames of all links whose place on their parents is known.
+
+        Args:
+            values: of joints, by their names [rad or m].
+            time: they are of [s].
+        """
+        named, frames = {joint.name: joint for joint in self.joints.values()}, []
+        for link, joint in self.joints.items():
+            source, factor, offset = joint, 1.0, 0.0
+            for _ in range(_DEEPEST):  # of joints that mimic others, which may mimic others again
+                if source.name in values or source.mimics not in named:
+                    break
+                factor, offset = factor * source.factor, offset + factor * source.offset
+                source = named[source.mimics]
+            if joint.kind == FIXED or source.name in values:
+                pose = joint.pose_at(factor * values.get(source.name, 0.0) + offset)
+                if pose is not None:
+                    frames.append(Frame(link, joint.parent, *pose, None if joint.kind == FIXED else time))
+        return frames
 
     def geometries(self, link: str) -> list[Geometry]:
         """What a link collides with, or looks like if that is not told.
@@ -196,8 +199,8 @@ def _joint(element: ElementTree.Element, links: dict) -> tuple[str, Joint]:
     name = shown(element.get("name", ""))
     where = f"joint '{name}'"
     kind = element.get("type", "")
-    if kind not in _JOINTS:
-        raise SceneError(f"{where}: unknown type '{shown(kind)}'; known are {', '.join(_JOINTS)}")
+    if kind not in JOINTS:
+        raise SceneError(f"{where}: unknown type '{shown(kind)}'; known are {', '.join(JOINTS)}")
     ends = []
     for role in ("parent", "child"):
         found = element.find(role)
@@ -208,7 +211,17 @@ def _joint(element: ElementTree.Element, links: dict) -> tuple[str, Joint]:
             raise SceneError(f"{where}, {role}: there is no link '{shown(link)}'")
         ends.append(link)
     parent, child = ends
-    return child, Joint(kind, parent, *_origin(element, where))
+    axis = element.find("axis")
+    along = np.array([1.0, 0.0, 0.0]) if axis is None else _numbers(axis, "xyz", 3, f"{where}, axis", "1 0 0")
+    if kind not in (FIXED, FLOATING) and not along.any():
+        raise SceneError(f"{where}, axis: must not be the zero vector")
+    joint = Joint(kind, parent, *_origin(element, where), element.get("name", ""), along / max(np.linalg.norm(along), 1e-300))
+    mimic = element.find("mimic")
+    if mimic is None:
+        return child, joint
+    where = f"{where}, mimic"
+    factor, offset = (float(_numbers(mimic, key, 1, where, usual)[0]) for key, usual in (("multiplier", "1"), ("offset", "0")))
+    return child, replace(joint, mimics=_attribute(mimic, "joint", where), factor=factor, offset=offset)
 
 
 def _below(root: str, joints: dict[str, Joint]) -> list[str]:

@@ -15,7 +15,7 @@ from msg_adapters.sensor_msgs import POINT_FIELDS, USUAL_FIELDS
 from sand_sim.simulation import PACINGS
 
 _OF_ROS = ("use_sim_time", "start_type_description_service")
-SOURCES = ("pose", "twist", "tf")
+SOURCES = ("pose", "twist", "tf", "joint_states")
 STARTS = ("scene", "first_pose")
 WRENCH_FRAMES = ("tool", "world")
 _SCENE = "dig"

@@ -1,14 +1,17 @@
-"""What drives the tools: poses, velocities or TF, each from its topic to the simulation."""
+"""What drives the tools: poses, velocities, TF or joint states, each from its topic to the simulation."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TwistStamped
+from sensor_msgs.msg import JointState
 
 from msg_adapters import tf2_msgs
 from msg_adapters.geometry_msgs import pose_to_command, twist_to_command
+from msg_adapters.sensor_msgs import joints_to_values
 from sand_sim import rotation
+from sand_sim.assembly.urdf import parse_robot
 from sand_sim.border import CommandError, Frame, Observation, ToolPose
 from sand_sim.node.connections import Connections
 from sand_sim.node.frames import FrameTree
@@ -16,6 +19,7 @@ from sand_sim.node.parameters import Parameters, frame_declarations
 from sand_sim.scene.reading_poses import in_degrees
 from sand_sim.simulation import Simulation
 
+FOLLOWING = "tf", "joint_states"  # sources that tell frames, one of which is the tool's
 _NO_MOVE, _NO_TURN = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
 
 
@@ -32,6 +36,9 @@ class ToolInputs:
 
     Attributes:
         frames: in which poses may be given.
+
+    Raises:
+        ValueError: if joint states shall move a tool whose frame is no link of the robot.
     """
 
     def __init__(
@@ -51,13 +58,19 @@ class ToolInputs:
         simulation.courses.placed = frozenset(name for name in names if parameters[f"tools.{name}.start"] == "first_pose")
         for name in names:
             self._connect(connections, name)
+        if by_joints := [name for name in names if parameters[f"tools.{name}.source"] == "joint_states"]:
+            self._robot, self._joints = parse_robot(simulation.world.scene.robot_description), {}
+            for name in by_joints:
+                if (link := self._followers[name]) not in self._robot.links:
+                    raise ValueError(f"parameter tools.{name}.frame: '{link}' is no link of the robot, so no joint moves it")
+            connections.subscription(JointState, "/joint_states", self._hear_joints)
         if tf2_msgs.TFMessage is not None:
             connections.subscription(tf2_msgs.TFMessage, "/tf", lambda message: self._hear_frames(message, False))
             connections.subscription(tf2_msgs.TFMessage, "/tf_static", lambda message: self._hear_frames(message, True), True)
 
     def _connect(self, connections: Connections, tool: str) -> None:
         source = self._parameters[f"tools.{tool}.source"]
-        if source == "tf":
+        if source in FOLLOWING:
             self._followers[tool] = self._parameters[f"tools.{tool}.frame"]
         elif source == "twist":
             self._listen(connections, TwistStamped, tool, "twist", self._velocity)
@@ -103,8 +116,17 @@ class ToolInputs:
         return replace(command, linear=rotation.rotate(turn, command.linear), angular=rotation.rotate(turn, command.angular))
 
     def _hear_frames(self, message, fixed: bool) -> None:
+        self._heed(tf2_msgs.message_to_frames(message, fixed))
+
+    def _hear_joints(self, message: JointState) -> None:
+        """Joint states may come in parts, from several publishers."""
+        values, time = joints_to_values(message)
+        self._joints |= values
+        self._heed(self._robot.frames_at(self._joints, time))
+
+    def _heed(self, frames: list[Frame]) -> None:
         told = set()
-        for frame in tf2_msgs.message_to_frames(message, fixed):
+        for frame in frames:
             if frame.name in self._fixed:
                 continue  # what the parameters and the robot description fix stays
             try:
@@ -147,6 +169,12 @@ def check_sources(parameters: Parameters, tools: Sequence[str]) -> None:
     for tool in tools:
         if parameters[f"tools.{tool}.source"] == "tf" and tf2_msgs.TFMessage is None:
             raise ValueError(f"parameter tools.{tool}.source: 'tf' needs the package tf2_msgs, which is not installed")
+        if parameters[f"tools.{tool}.source"] == "joint_states" and not (
+            parameters["robot_description"] or parameters["robot_description_topic"]
+        ):
+            raise ValueError(
+                f"parameter tools.{tool}.source: 'joint_states' needs a robot; give robot_description_topic or robot_description"
+            )
         if parameters[f"tools.{tool}.source"] == "twist" and parameters[f"tools.{tool}.start"] == "first_pose":
             raise ValueError(f"parameter tools.{tool}.start: 'first_pose' needs poses, and its source is 'twist'; take 'scene'")
 

@@ -15,6 +15,7 @@ from sand_sim.node.connections import Connections
 from sand_sim.node.low_pass import LowPass
 from sand_sim.node.parameters import Parameters
 from sand_sim.node.rate import Rate
+from sand_sim.node.tool_inputs import FOLLOWING
 from sand_sim.world import World
 
 _WEIGHTS_PER_DIAMETER = 20.0  # a force of so many grain weights is drawn as long as a grain is wide
@@ -74,9 +75,9 @@ class ToolOutputs:
 
     @property
     def follows(self) -> bool:
-        """Whether others tell its frame, so that we must not: it follows TF, or the frame is that of a link of a robot."""
+        """Whether others tell its frame, so that we must not: it follows one, or the frame is that of a link of a robot."""
         link = self._world.scene.tool(self._tool).link
-        return self._parameters[f"tools.{self._tool}.source"] == "tf" or self._frame_id == link
+        return self._parameters[f"tools.{self._tool}.source"] in FOLLOWING or self._frame_id == link
 
     @property
     def _frame_id(self) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robots import joint, link, origin, part, robot
+from robots import joint, link, moved, origin, part, robot
 
 from sand_sim import SceneError, rotation
 from sand_sim.assembly.urdf import load_robot, parse_robot
@@ -57,6 +57,64 @@ def test_links_behind_a_movable_joint_are_not_fixed(kind):
     assert described.joints["arm"].kind == kind
 
 
+def turned_about(axis, angle):
+    """Rodrigues' formula, as a matrix (4, 4)."""
+    x, y, z = np.array(axis) / np.linalg.norm(axis)
+    across, whole = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]), np.eye(4)
+    whole[:3, :3] += np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
+    return whole
+
+
+def shifted(vector):
+    whole = np.eye(4)
+    whole[:3, 3] = vector
+    return whole
+
+
+def test_links_are_where_their_joints_put_them():
+    """Products of matrices: a boom that turns, a stick that slides, a bucket that mimics the boom, a tip that is fixed."""
+    places = [((0.1, 0.2, 0.3), (0.4, -0.5, 0.6)), ((0.5, 0.0, 0.1), (0.0, 0.3, 0.0)), ((0.0, 0.1, 0.0), (1.0, 0.0, 0.0))]
+    tip = (0.0, 0.0, 0.2), (0.0, 0.0, 0.7)
+    mimic = '<mimic joint="base_boom" multiplier="-2" offset="0.1"/>'
+    described = parse_robot(
+        robot(
+            *map(link, ("base", "boom", "stick", "bucket", "tip")),
+            moved("base", "boom", "revolute", "0 1 1", origin(*places[0])),
+            moved("boom", "stick", "prismatic", "0 0 2", origin(*places[1])),
+            moved("stick", "bucket", "continuous", None, origin(*places[2]), mimic),
+            joint("bucket", "tip", origin(*tip)),
+        )
+    )
+    angle, reach = 0.8, 0.25
+    frames = {frame.name: frame for frame in described.frames_at({"base_boom": angle, "boom_stick": reach}, 1.5)}
+    assert [frames[name].time for name in ("boom", "stick", "bucket", "tip")] == [1.5, 1.5, 1.5, None]
+    tree = FrameTree("base")
+    for frame in frames.values():
+        tree.put(frame)
+    expected = transform(*places[0]) @ turned_about([0.0, 1.0, 1.0], angle)
+    expected = expected @ transform(*places[1]) @ shifted([0.0, 0.0, reach])
+    expected = expected @ transform(*places[2]) @ turned_about([1.0, 0.0, 0.0], -2.0 * angle + 0.1) @ transform(*tip)
+    position, orientation = tree.in_root("tip", np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+    assert position == pytest.approx(expected[:3, 3], abs=1e-12)
+    assert rotation.to_matrices(orientation) == pytest.approx(expected[:3, :3], abs=1e-12)
+
+
+def test_links_whose_joints_are_not_told_are_nowhere():
+    """Nor those behind joints that one number does not tell, or that mimic one another in a ring."""
+    ring = '<mimic joint="{}"/>'
+    described = parse_robot(
+        robot(
+            *map(link, ("base", "boom", "float", "one", "two")),
+            moved("base", "boom", "revolute"),
+            moved("base", "float", "floating"),
+            moved("base", "one", "revolute", more=ring.format("base_two")),
+            moved("base", "two", "revolute", more=ring.format("base_one")),
+        )
+    )
+    assert described.frames_at({}, 0.0) == []
+    assert [frame.name for frame in described.frames_at({"base_boom": 0.0, "base_float": 1.0}, 0.0)] == ["boom"]
+
+
 def test_what_is_not_about_links_and_joints_is_passed_over():
     further = '<transmission name="t"><joint name="j"/></transmission><gazebo reference="a"/><material name="m"/>text'
     described = parse_robot(robot(link("a"), link("b"), joint("a", "b"), further))
@@ -96,6 +154,9 @@ AB = link("a"), link("b")
         (robot(*AB, joint("a", "b", '<origin xyz="1 2"/>')), "joint 'a_b', origin: xyz must be 3 finite numbers, got '1 2'"),
         (robot(*AB, joint("a", "b", '<origin rpy="0 nan 0"/>')), "rpy must be 3 finite numbers, got '0 nan 0'"),
         (robot(*AB, joint("a", "b", '<origin xyz="0 0 ${h}"/>')), "xacro file.xacro > file.urdf"),
+        (robot(*AB, moved("a", "b", "revolute", "0 0 0")), "joint 'a_b', axis: must not be the zero vector"),
+        (robot(*AB, moved("a", "b", "revolute", "0 1")), "joint 'a_b', axis: xyz must be 3 finite numbers, got '0 1'"),
+        (robot(*AB, moved("a", "b", "revolute", more="<mimic/>")), "joint 'a_b', mimic: the attribute 'joint' is missing"),
         (robot(*AB, joint("a", "b", '<origin quat_xyzw="0 0 0 1"/>')), "unknown attribute 'quat_xyzw'; known are xyz, rpy"),
         ('<robot><xacro:include filename="x"/></robot>', "is not expanded yet; run: xacro file.xacro > file.urdf"),
         (robot(link("a\u202ey" + "x" * 1000), link("b")), "there are 2: a?yxxx"),

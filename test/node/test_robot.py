@@ -13,11 +13,13 @@ pytestmark = pytest.mark.xdist_group("processes")
 
 from node_client import PATIENCE, START
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from robots import joint, link, origin, part, robot
+from robots import joint, link, moved, origin, part, robot
 from scenes import write_small_scene
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from msg_adapters.geometry_msgs import wrench_to_arrays
+from msg_adapters.sensor_msgs import values_to_joints
 from sand_sim import SceneError, rotation
 from sand_sim.interruption import InterruptedByUserError
 from sand_sim.node.node import SandSimNode
@@ -80,6 +82,34 @@ def test_a_topic_tells_the_robot(client, start_node):
     assert not [name for name in client.node.get_node_names() if name.endswith("_listener")]
 
 
+LIFT = robot(
+    link("world"),
+    link("mast"),
+    link("arm"),
+    link("blade", PLATE),
+    joint("world", "mast", origin(*MAST)),
+    moved("mast", "arm", "prismatic", "0 0 1"),
+    joint("arm", "blade", origin((0.015, 0.985, 0.0), (0.0, 0.0, -0.5 * np.pi))),
+)
+
+
+def test_a_link_is_driven_by_joint_states(client, start_node):
+    """The mast stands at (1, 0, 0.5), turned left: the blade is at (0.015, 0.015, 0.5 + lift)."""
+    node = start_node(TOOLS, pacing="lockstep", robot_description=LIFT, **{"tools.plate.source": "joint_states"})
+    states = client.node.create_publisher(JointState, "/joint_states", 10)
+    client.wait_for(states.get_subscription_count)
+    states.publish(values_to_joints({"gripper": 0.1}, 0.05))  # another one's part
+    for at, lift in ((0.1, -0.44), (0.5, -0.4762), (0.6, -0.4762)):
+        states.publish(values_to_joints({"wrist": 1.0, "mast_arm": lift}, at))
+        client.wait_for(lambda: client.time > at - 1e-5)  # noqa: B023
+        report = node.simulation.request(node.simulation.world.observe).result(30.0).tools[0]
+        assert report.position == pytest.approx([0.015, 0.015, 0.5 + lift], abs=1e-9)
+        assert abs(report.orientation[3]) == pytest.approx(1.0, abs=1e-9)
+    client.wait_for(lambda: any(wrench_to_arrays(message)[0][2] > 0.5 for message in client.wrenches))
+    states.publish(values_to_joints({"mast_arm": np.nan}, 0.7))
+    client.wait_for(lambda: node.simulation.rejected == {"not_finite": 1})
+
+
 def test_a_root_that_is_not_the_world_is_placed_by_parameters(client, start_node):
     described = ROBOT.replace('"world"', '"base"')
     placed = {"frame_names": ["base"], "frames.base.pose": [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]}
@@ -128,6 +158,14 @@ BURIED_WORLD = robot(link("base"), link("world"), joint("base", "world"), link("
             "tools.plate.link: link 'blade', collision 1: mesh 'file:///etc/passwd': lies outside the folders",
         ),
         ({"robot_description": ROBOT.replace("plate.stl", "package://../../etc/passwd")}, "no ROS package '..'"),
+        (
+            {"robot_description": LIFT, "tools.plate.source": "joint_states", "tools.plate.frame": "tcp"},
+            "tools.plate.frame: 'tcp' is no link of the robot",
+        ),
+        (
+            {"tools.plate.source": "joint_states"},
+            "tools.plate.source: 'joint_states' needs a robot; give robot_description",
+        ),
         ({"robot_description": BURIED_WORLD}, "robot description: frame 'world' in 'base': needs two different names"),
     ],
 )

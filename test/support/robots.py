@@ -19,5 +19,11 @@ def joint(parent, child, place="", kind="fixed"):
     return f'<joint name="{parent}_{child}" type="{kind}">{place}<parent link="{parent}"/><child link="{child}"/></joint>'
 
 
+def moved(parent, child, kind, axis=None, place="", more=""):
+    """A movable joint with an axis, as text."""
+    about = "" if axis is None else f'<axis xyz="{axis}"/>'
+    return joint(parent, child, f"{place}{about}{more}", kind)
+
+
 def robot(*elements):
     return f'<?xml version="1.0" encoding="utf-8"?>\n<robot name="digger">{"".join(elements)}</robot>'
