@@ -99,24 +99,24 @@ def test_what_is_felt_is_the_momentum_that_grains_gain_meanwhile(make_plate_worl
 
 @pytest.mark.parametrize("integrator", ["velocity_verlet", "symplectic_euler"])
 def test_means_of_a_turning_tool_are_taken_in_axes_that_turn_with_it(make_plate_world, integrator):
-    """A plate on edge sweeps grains round by 57 degrees: what it feels in each degree, in its axes of then, on the mean."""
+    """A plate on edge sweeps grains round by 57 degrees: what it feels in each step, in its axes of then, on the mean."""
     grains = [[0.02, 0.0085 + 0.0101 * k, 0.004 * k] for k in range(4)]
     pose = {"pose": {"position": [0.0, 0.0, 0.0], "rpy": [np.pi / 2, 0.0, 0.0]}}
-    at_once, by_degrees = (
+    at_once, by_steps = (
         make_plate_world(grains, pose=pose, gravity=[0.0] * 3, friction=0.3, solver={"integrator": integrator}) for _ in range(2)
     )
-    for world in (at_once, by_degrees):
+    for world in (at_once, by_steps):
         world.apply(world.pose_after(ToolVelocity("plate", np.zeros(3), np.array([0.0, 0.0, 50.0])), 0.02))
-    looks, sums, begin = 60, np.zeros((4, 3)), by_degrees.tools[0].tool.pose.orientation
-    steps = round(0.02 / looks / at_once.time_step)
-    at_once.step(looks * steps)
-    for look in range(looks):
-        by_degrees.step(steps)
-        report = by_degrees.observe().tool("plate")
-        turn = rotation.multiply(rotation.from_vector([0.0, 0.0, 50.0 * (look + 0.5) * steps * at_once.time_step]), begin)
+    steps, dt, sums = round(0.02 / at_once.time_step), at_once.time_step, np.zeros((4, 3))
+    begin = by_steps.tools[0].tool.pose.orientation
+    at_once.step(steps)
+    for step in range(steps):
+        by_steps.step(1)
+        report = by_steps.observe().tool("plate")
+        turn = rotation.multiply(rotation.from_vector([0.0, 0.0, 50.0 * (step + 0.5) * dt]), begin)
         felt = np.array([report.world_force, report.world_torque])
         sums += np.concatenate([felt, rotation.rotate(rotation.inverse(turn), felt)])
-    report, means = at_once.observe().tool("plate"), sums / looks
+    report, means = at_once.observe().tool("plate"), sums / steps
     assert np.abs(means[2, 2]) > 0.1, "the plate's face pushes"
     for found, mean in zip((report.world_force, report.world_torque, report.force, report.torque), means, strict=True):
         assert found == pytest.approx(mean, abs=2e-3 * np.linalg.norm(mean))
