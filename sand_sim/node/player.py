@@ -20,7 +20,7 @@ from sand_sim.scene.types import Scene, SceneError
 from sand_sim.tool_motion.playing import commands_at, driven_tools, frame_times, pose_times
 
 _AHEAD = 0.2  # [s] of simulated time by which poses are sent before they are due
-_PATIENCE = 3.0  # [s] of waiting after which it is told what for
+_PATIENCE = 3.0  # [s] of waiting after which it is told what for, and again if that is something else by then
 
 
 def play(scene: Scene, target: str, frame_id: str, clock_topic: str, interruption: Interruption) -> int:
@@ -65,7 +65,7 @@ def play(scene: Scene, target: str, frame_id: str, clock_topic: str, interruptio
         }
         ends = [0.0, *frame_times(scene)]
         times = (moment for begin, end in pairwise(ends) for moment in pose_times(scene, begin, end))
-        due, begun, told_at = next(times, None), False, time.monotonic() + _PATIENCE
+        due, begun, told, tell_at = next(times, None), False, "", time.monotonic() + _PATIENCE
         while not interruption.asked:
             rclpy.spin_once(node, timeout_sec=0.05)
             # Matched, not only known: what is sent before that is lost, and the node would wait for it.
@@ -73,12 +73,11 @@ def play(scene: Scene, target: str, frame_id: str, clock_topic: str, interruptio
             if not begun:
                 begun = present and clock[0] is not None and bool(frame[0])
                 if not begun:
-                    if time.monotonic() > told_at:
-                        told_at = float("inf")
-                        print(
-                            f"sand_sim: waiting for node '{target}': {_missing(target, publishers, clock[0], clock_topic)}",
-                            file=sys.stderr,
-                        )
+                    if time.monotonic() > tell_at:
+                        missing = _missing(target, publishers, clock[0], clock_topic)
+                        if missing != told:
+                            print(f"sand_sim: waiting for node '{target}': {missing}", file=sys.stderr)
+                        told, tell_at = missing, time.monotonic() + _PATIENCE
                     continue
                 if clock[0] > scene.duration - 0.5 / scene.frame_rate:
                     raise SceneError(_past(scene, target, clock[0]))

@@ -77,7 +77,10 @@ def test_poses_are_in_the_world_frame_of_the_node_or_the_one_that_is_asked_for(s
 def test_it_says_what_it_waits_for(start_node, play, parameters, target, missing):
     start_node(pacing="lockstep", **parameters)
     process = play("--node", target)
-    assert process.stderr.readline() == f"sand_sim: waiting for {missing}\n"
+    told = process.stderr.readline()
+    if "nobody hears /sand_sim" in told:  # the two took long to find each other; what is missing then is told next
+        told = process.stderr.readline()
+    assert told == f"sand_sim: waiting for {missing}\n"
     process.send_signal(signal.SIGINT)
     assert finish(process) == (130, "")
 
