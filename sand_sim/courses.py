@@ -262,6 +262,7 @@ class Courses:
             course.waiting.append(command)
         else:
             self._world.apply(command)  # what is under way has no time of its own to keep to
+            course.waiting.clear()  # nor has the rest of a velocity
         course.promised, course.last_taken = command.time, now
 
     def _replace(self, command: Command) -> None:
@@ -301,7 +302,7 @@ class Courses:
         soon = min(end, now + _unambiguous(velocity))
         pose = self._world.pose_after(velocity, soon - now)
         self._world.apply(replace(pose, time=soon))
-        if soon < end:
+        if end - soon > self._world.time_step:
             begun = self._world.pose_after(ToolVelocity(velocity.tool, np.zeros(3), np.zeros(3)), soon - now)
             course.waiting.appendleft(replace(in_world(velocity, begun.orientation), time=end))
 

@@ -299,6 +299,16 @@ def test_a_tool_turns_by_more_than_half_a_turn_while_a_velocity_holds(tmp_path, 
     assert driven.courses.limited == 0
 
 
+def test_a_pose_replaces_what_is_left_of_a_velocity(tmp_path):
+    driven = Driven(tmp_path, hold=0.25)
+    driven.take(velocity((0.0, 0.0, 0.0), (0.0, 0.0, 20.0)))
+    driven.go_to(0.02)
+    driven.take(pose(0.0, 0.1))
+    driven.go_to(0.2)
+    assert driven.tool.spin == pytest.approx(np.zeros(3))
+    assert not driven.rejected
+
+
 def test_a_spin_beyond_the_limit_is_slowed_until_the_next_command(tmp_path):
     """Corners of the plate, 44 mm from its axis with their particles, are 1 m/s fast at most."""
     driven = Driven(tmp_path, hold=0.25)

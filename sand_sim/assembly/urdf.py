@@ -65,12 +65,12 @@ class Robot:
         hung = [(name, fixed[name]) for name in _below(self.root, fixed)]
         return [Frame(name, joint.parent, joint.position, joint.orientation) for name, joint in hung]
 
-    def frames_at(self, values: dict[str, float], time: float | None) -> list[Frame]:
+    def frames_at(self, values: dict[str, float], times: dict[str, float]) -> list[Frame]:
         """Frames of all links whose place on their parents is known.
 
         Args:
             values: of joints, by their names [rad or m].
-            time: they are of [s].
+            times: they are of, by the same names [s].
         """
         named, frames = {joint.name: joint for joint in self.joints.values()}, []
         for link, joint in self.joints.items():
@@ -83,7 +83,7 @@ class Robot:
             if joint.kind == FIXED or source.name in values:
                 pose = joint.pose_at(factor * values.get(source.name, 0.0) + offset)
                 if pose is not None:
-                    frames.append(Frame(link, joint.parent, *pose, None if joint.kind == FIXED else time))
+                    frames.append(Frame(link, joint.parent, *pose, None if joint.kind == FIXED else times[source.name]))
         return frames
 
     def geometries(self, link: str) -> list[Geometry]:

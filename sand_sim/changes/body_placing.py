@@ -10,6 +10,7 @@ from sand_sim.border import BodyReport, CommandError, GrainCloud
 from sand_sim.changes.carrying_over import rebuild
 from sand_sim.changes.clearance import find_obstacles
 from sand_sim.changes.exchange import FASTEST
+from sand_sim.engine.pushes import forget_push
 from sand_sim.engine.reviving import revive
 from sand_sim.grain_table import GrainTable
 from sand_sim.readout.observing import observe_bodies, observe_grains
@@ -110,6 +111,7 @@ def put_body(assembly: Assembly, name: str, rows: GrainTable, spheres: GrainClou
     assembly.solver.remove(own)
     assembly.solver.renew_lists()
     revive(assembly.solver, begun.solver.take_state(), own)
+    forget_push(assembly.solver.arrays.bodies.pushes, find_body(assembly, name))
 
 
 def _as_in_scene(body: Body) -> BodyReport:

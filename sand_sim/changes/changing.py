@@ -120,6 +120,8 @@ class Changeable:
     def place_body(self, body: str, position, orientation=None, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) -> None:
         """Put a free rigid body somewhere else at once, also one that has left the domain; ``reset`` brings it back.
 
+        Nothing pushes it there until it is told so anew.
+
         Args:
             body: name.
             position: of the origin of its own frame, shape (3,) [m].
@@ -149,7 +151,8 @@ class Changeable:
             torque: about the origin of the body's own frame, world frame, shape (3,) [N m].
 
         Raises:
-            CommandError: if there is no such body, it has left the domain, or the numbers make no sense; nothing is changed then.
+            CommandError: if there is no such body, it has left the domain, or the numbers make no sense or would tear it away;
+                nothing is changed then.
         """
         push(self.assembly, body, force, torque)
 

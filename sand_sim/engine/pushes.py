@@ -40,6 +40,14 @@ def set_push(pushes: wp.array, index: int, force: np.ndarray, torque: np.ndarray
     pushes.assign(wp.array(rows, dtype=Push, device="cpu"))
 
 
+def forget_push(pushes: wp.array, index: int) -> None:
+    """Push one of them no more, which is somewhere else now; what has been done stays."""
+    rows = pushes.numpy().copy()
+    for name in ("force", "torque", "acted_force", "acted_torque", "way", "turn"):
+        rows[name][index] = 0.0
+    pushes.assign(wp.array(rows, dtype=Push, device="cpu"))
+
+
 @wp.func
 def begin_push(push: Push, fresh: bool) -> Push:
     """At the begin of a step; ``fresh`` if there is no step before that is to be completed."""

@@ -53,13 +53,13 @@ class ToolInputs:
         self._parameters, self._simulation, self._active, self._last = parameters, simulation, active, last
         self.frames, self._fixed = frames, frames.names
         self._followers: dict[str, str] = {}
-        self._followed: dict[str, float] = {}
+        self._followed: dict[str, float | list[float]] = {}
         names = [tool.name for tool in simulation.world.scene.tools]
         simulation.courses.placed = frozenset(name for name in names if parameters[f"tools.{name}.start"] == "first_pose")
         for name in names:
             self._connect(connections, name)
         if by_joints := [name for name in names if parameters[f"tools.{name}.source"] == "joint_states"]:
-            self._robot, self._joints = parse_robot(simulation.world.scene.robot_description), {}
+            self._robot, self._joints = parse_robot(simulation.world.scene.robot_description), ({}, {})
             for name in by_joints:
                 if (link := self._followers[name]) not in self._robot.links:
                     raise ValueError(f"parameter tools.{name}.frame: '{link}' is no link of the robot, so no joint moves it")
@@ -120,9 +120,11 @@ class ToolInputs:
 
     def _hear_joints(self, message: JointState) -> None:
         """Joint states may come in parts, from several publishers."""
-        values, time = joints_to_values(message)
-        self._joints |= values
-        self._heed(self._robot.frames_at(self._joints, time))
+        told, time = joints_to_values(message)
+        own, (values, times) = {joint.name for joint in self._robot.joints.values()}, self._joints
+        values |= {name: value for name, value in told.items() if name in own}
+        times |= dict.fromkeys(own & told.keys(), time)
+        self._heed(self._robot.frames_at(values, times))
 
     def _heed(self, frames: list[Frame]) -> None:
         told = set()
@@ -143,9 +145,12 @@ class ToolInputs:
             chain = list(self.frames.chain(name))
         except CommandError:
             return  # not told yet
-        latest = self._newest([frame.time or 0.0 for frame in chain] or [0.0])
-        if told & {frame.name for frame in chain} and not (latest and latest == self._followed.get(tool)):
-            self._followed[tool] = latest
+        times = [frame.time or 0.0 for frame in chain] or [0.0]
+        latest = self._newest(times)
+        # Of joints, which several may tell of with one stamp, any news count.
+        news = times if self._parameters[f"tools.{tool}.source"] == "joint_states" else latest
+        if told & {frame.name for frame in chain} and not (latest and news == self._followed.get(tool)):
+            self._followed[tool] = news
             self._submit(lambda: ToolPose(tool, *self.frames.in_root(name, _NO_MOVE, _NO_TURN), time=latest or None), tool)
 
     def _newest(self, times: list[float]) -> float:

@@ -86,8 +86,11 @@ def test_links_are_where_their_joints_put_them():
         )
     )
     angle, reach = 0.8, 0.25
-    frames = {frame.name: frame for frame in described.frames_at({"base_boom": angle, "boom_stick": reach}, 1.5)}
-    assert [frames[name].time for name in ("boom", "stick", "bucket", "tip")] == [1.5, 1.5, 1.5, None]
+    frames = {
+        frame.name: frame
+        for frame in described.frames_at({"base_boom": angle, "boom_stick": reach}, {"base_boom": 1.5, "boom_stick": 2.0})
+    }
+    assert [frames[name].time for name in ("boom", "stick", "bucket", "tip")] == [1.5, 2.0, 1.5, None]
     tree = FrameTree("base")
     for frame in frames.values():
         tree.put(frame)
@@ -111,8 +114,10 @@ def test_links_whose_joints_are_not_told_are_nowhere():
             moved("base", "two", "revolute", more=ring.format("base_one")),
         )
     )
-    assert described.frames_at({}, 0.0) == []
-    assert [frame.name for frame in described.frames_at({"base_boom": 0.0, "base_float": 1.0}, 0.0)] == ["boom"]
+    assert described.frames_at({}, {}) == []
+    assert [
+        frame.name for frame in described.frames_at({"base_boom": 0.0, "base_float": 1.0}, {"base_boom": 0.0, "base_float": 0.0})
+    ] == ["boom"]
 
 
 def test_what_is_not_about_links_and_joints_is_passed_over():

@@ -161,6 +161,23 @@ def test_a_push_that_makes_no_sense_is_refused(make_bodies, body, force, told):
         make_bodies({"ball": BALL}, solver=STEP).push_body(body, force)
 
 
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_body_that_is_put_elsewhere_is_pushed_no_more(make_bodies, integrator):
+    """It has the velocity that it was given, at once and later."""
+    world = make_bodies({"ball": BALL}, solver=STEP | {"integrator": integrator})
+    world.push_body("ball", [1.0, 0.0, 0.0], [0.0, 0.01, 0.0])
+    world.step(20)
+    work = world.observe().health.tool_work
+    world.place_body("ball", [0.0, 0.3, 0.0], velocity=[0.0, 0.2, 0.0])
+    for _ in range(2):
+        seen = world.observe()
+        assert seen.body("ball").velocity == pytest.approx([0.0, 0.2, 0.0], abs=1e-12)
+        assert seen.body("ball").spin == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+        assert seen.health.gained < 1e-12
+        world.step(20)
+    assert abs(work) > 1e-5
+
+
 def test_a_body_that_has_left_is_not_pushed(make_bodies):
     world = make_bodies({"ball": BALL | {"velocity": [8.0, 0.0, 0.0]}}, solver=STEP)
     world.step(200)

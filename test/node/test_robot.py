@@ -110,6 +110,22 @@ def test_a_link_is_driven_by_joint_states(client, start_node):
     client.wait_for(lambda: node.simulation.rejected == {"not_finite": 1})
 
 
+def test_joints_that_are_told_one_by_one_with_the_same_stamp_all_count(client, start_node):
+    """As two drivers with one clock do: the later message takes the place of the one before."""
+    described = LIFT.replace('<joint name="arm_blade" type="fixed">', '<joint name="arm_blade" type="prismatic">')
+    node = start_node(TOOLS, pacing="realtime", robot_description=described, **{"tools.plate.source": "joint_states"})
+    states = client.node.create_publisher(JointState, "/joint_states", 10)
+    client.wait_for(states.get_subscription_count)
+    client.wait_for(lambda: client.time > 0.0)
+    at = client.time + 1.0
+    for joint_name, value in (("mast_arm", -0.42), ("arm_blade", 0.03)):
+        states.publish(values_to_joints({joint_name: value}, at))
+    states.publish(values_to_joints({"mast_arm": -0.43}, at))
+    client.wait_for(lambda: client.time > at)
+    report = node.simulation.request(node.simulation.world.observe).result(30.0).tools[0]
+    assert report.position == pytest.approx([0.045, 0.015, 0.07], abs=1e-6)
+
+
 def test_a_root_that_is_not_the_world_is_placed_by_parameters(client, start_node):
     described = ROBOT.replace('"world"', '"base"')
     placed = {"frame_names": ["base"], "frames.base.pose": [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]}
