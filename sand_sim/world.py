@@ -206,9 +206,7 @@ class World(Changeable):
         Raises:
             CommandError: if the tool is unknown.
         """
-        index = self._index_of(tool)
-        force, torque = self._wrenches.feel(self._solver.arrays, index, self.steps)
-        return force, torque
+        return tuple(self._wrenches.feel(self._solver.arrays, self._index_of(tool), self.steps))
 
     def tool_contacts(self, tool: str) -> ToolContacts:
         """Every contact of a tool with grains now, with its force; read when asked for, so that no frame pays for it.

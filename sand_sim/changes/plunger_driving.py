@@ -61,12 +61,11 @@ def _turn_over(assembly: Assembly, index: int, before: np.ndarray, after: np.nda
     else:
         here = walls["plunger"] == index
         felt = float((forces_on_walls(assembly)[here] * walls["direction"][here]).sum())
-        if not after["pressed"]:
-            state["velocity"] = state["seen"] = after["velocity"]
-        elif before["pressed"]:
-            state["velocity"] -= 0.5 * dt * (after["force"] - before["force"]) / after["mass"]
+        if after["pressed"]:
+            was = before["force"] if before["pressed"] else -felt  # what kept its velocity bore what the grains did
+            state["velocity"] -= 0.5 * dt * (after["force"] - was) / after["mass"]
         else:
-            state["velocity"] -= 0.5 * dt * (after["force"] + felt) / after["mass"]
+            state["velocity"] = state["seen"] = after["velocity"]
         if assembly.recipe.integrator == VERLET:
             state["work"] += 0.5 * dt * felt * (state["velocity"] - old)
     arrays.plungers.states.assign(wp.array(states, dtype=PlungerState, device="cpu"))

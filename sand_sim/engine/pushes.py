@@ -75,7 +75,9 @@ def end_push(push: Push, orientation: wp.quatd, way: wp.vec3d, turn: wp.vec3d) -
     """At the end of a step that began with this orientation: add work, half the step before and half this one."""
     acted = torque_about_centre(push, push.acted_torque, push.acted_force, orientation)
     acts = torque_about_centre(push, push.torque, push.force, orientation)
-    ended = begin_push(push, True)
+    ended = push
+    ended.acted_force = push.force
+    ended.acted_torque = push.torque
     done = wp.dot(push.acted_force, push.way) + wp.dot(acted, push.turn) + wp.dot(push.force, way) + wp.dot(acts, turn)
     ended.work = push.work + wp.float64(0.5) * done
     ended.way = way
