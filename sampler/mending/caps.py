@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from sampler.geometry.loops import span_loops
+from sampler.geometry.surface import Surface
 from sampler.geometry.topology import edges_of
+from sampler.mending.bridges import bridge, facing_rims
 
 
 @dataclass(frozen=True)
@@ -27,20 +29,28 @@ class Caps:
     turn: np.ndarray
 
 
-def close_holes(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) -> Caps:
+def close_holes(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray, bridged: bool = False) -> Caps:
     """Span all boundary loops of consistently oriented components.
 
     Args:
         vertices: shape (n, 3) [m].
         faces: shape (m, 3).
         component: of each face, shape (m,).
+        bridged: where two loops are the ends of one gap, close it by one bridge instead of a cap each.
     """
     found = list(boundary_loops(faces, component))
     owner, loops = np.array([owner for owner, _ in found], np.int64), [loop for _, loop in found]
-    caps = span_loops(vertices, loops)
+    turn = _turns(vertices, faces, component, owner, loops)
+    area = np.bincount(component, Surface.areas_of(vertices[faces]))
+    pairs = facing_rims(vertices, faces, owner, loops, turn, area) if bridged else []
+    bridges = [bridge(vertices, loops[first], loops[second]) for first, second in pairs]
+    alone = np.setdiff1d(np.arange(len(loops)), np.array(pairs, np.int64))
+    caps = span_loops(vertices, [loops[k] for k in alone]) + [triangles for _, triangles in bridges]
+    loops = [loops[k] for k in alone] + [loop for loop, _ in bridges]
+    first, second = np.array(pairs, np.int64).reshape(-1, 2).T
+    owner, turn = np.concatenate([owner[alone], owner[first]]), np.concatenate([turn[alone], turn[first] + turn[second]])
     number = [len(cap) for cap in caps]
     spanned = np.concatenate([np.zeros((0, 3), np.int64), *caps])
-    turn = _turns(vertices, faces, component, owner, loops)
     return Caps(spanned, np.repeat(owner, number), np.repeat(np.arange(len(number)), number), loops, turn)
 
 

@@ -101,7 +101,7 @@ def repair_mesh(mesh: trimesh.Trimesh, sheets: str = "auto") -> RepairedMesh:
         vertices = _meet(vertices, sewn)
         faces = _drop(sewn[faces], report)
     faces, component, piece, report.steps["faces turned"], clashes = agree_faces(vertices, faces)
-    caps = close_holes(vertices, faces, component)
+    caps = close_holes(vertices, faces, component, bridged=True)
     area = np.bincount(component, Surface.areas_of(vertices[faces]))
     sheet = _sheets(sheets, component, area, caps, vertices)
     enclosing = sheets == "auto" and sheet.sum() > 1 and _enclosing(vertices[faces], sheet[component], sheet.sum() > _SCATTERED)
