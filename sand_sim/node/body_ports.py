@@ -46,7 +46,7 @@ class BodyPorts:
     ):
         self._parameters, self._simulation, self._active, self._frames = parameters, simulation, active, frames
         self._model, self._turn, name = model, np.asarray(model.body.pose.orientation), model.body.name
-        taken = {parameters[f"tools.{tool.name}.frame"] for tool in simulation.world.scene.tools}
+        taken = {parameters["frame_id"], *(parameters[f"tools.{tool.name}.frame"] for tool in simulation.world.scene.tools)}
         self._frame_id = f"bodies/{name}" if name in taken else name
         topic = f"~/bodies/{topic_part(name)}"
         self._odometry = connections.publisher(Odometry, f"{topic}/odometry")
@@ -101,6 +101,21 @@ class BodyPorts:
     def _heed(self, done: Future) -> None:
         if not done.cancelled() and isinstance(error := done.exception(), CommandError):
             self._simulation.reject(error)
+
+
+def body_ports(
+    connections: Connections, parameters: Parameters, simulation: Simulation, active: Callable[[], bool], frames: FrameTree
+) -> list[BodyPorts]:
+    """Ports for each body of the scene; arguments as of ``BodyPorts``.
+
+    Raises:
+        ValueError: if two bodies would share their topics, naming both.
+    """
+    of_part: dict[str, str] = {}
+    for name in (model.body.name for model in simulation.world.assembly.bodies):
+        if (first := of_part.setdefault(topic_part(name), name)) != name:
+            raise ValueError(f"scene: bodies '{first}' and '{name}' would share '~/bodies/{topic_part(name)}'; rename one")
+    return [BodyPorts(connections, parameters, simulation, active, frames, body) for body in simulation.world.assembly.bodies]
 
 
 def topic_part(name: str) -> str:

@@ -20,7 +20,7 @@ from sand_sim.config_folder import find_scene
 from sand_sim.courses import StampRules
 from sand_sim.engine.explicit_dem import UnstableError
 from sand_sim.node.bed_outputs import BedOutputs, coarse_points
-from sand_sim.node.body_ports import BodyPorts
+from sand_sim.node.body_ports import body_ports
 from sand_sim.node.change_services import ChangeServices
 from sand_sim.node.connections import Connections
 from sand_sim.node.diagnosis import Diagnosis
@@ -231,7 +231,7 @@ class SandSimNode(ManagedNode):
         self._endings.callback(self._bed.close)
         shared = connections, parameters, self.simulation, lambda: self._active, frames
         ToolInputs(*shared, lambda: self._last)
-        self._movers = [*tools, *(BodyPorts(*shared, model) for model in world.assembly.bodies)]
+        self._movers = [*tools, *body_ports(*shared)]
         self.answering = Services(self, connections, self.simulation, self.hold)
         ChangeServices(connections, self.answering, self.simulation, Path(expanduser(parameters["states"])))
         if simulation_interfaces.srv is None:

@@ -122,5 +122,28 @@ def test_a_body_that_has_left_is_told_no_more(client, start_node, pushes, heard)
     client.wait_for(lambda: node.simulation.rejected["outside"] == 1)
 
 
+def test_a_body_may_be_called_as_the_world_frame(client, start_node):
+    """Its frame is another one, and what is pushed in the world frame is not turned with it."""
+    node = start_node(AFLOAT | {"bodies": {"world": AFLOAT["bodies"]["ball-1"]}}, pacing="lockstep")
+    heard = []
+    client.node.create_subscription(Odometry, "/sand_sim/bodies/world/odometry", heard.append, 100)
+    pushes = client.node.create_publisher(WrenchStamped, "/sand_sim/bodies/world/push", 10)
+    client.wait_for(lambda: pushes.get_subscription_count() and node.simulation.world.observed)
+    client.wait_for(lambda: client.node.count_publishers("/sand_sim/bodies/world/odometry"))
+    told = step(client, heard)
+    assert (told.header.frame_id, told.child_frame_id) == ("world", "bodies/world")
+    pushes.publish(arrays_to_wrench([0.02, 0.0, 0.0], [0.0] * 3, 0.0, "world"))
+    acting = node.simulation.world.assembly.solver.arrays.bodies.pushes
+    client.wait_for(lambda: np.any(acting.numpy()["force"]))
+    assert acting.numpy()["force"][0] == pytest.approx([0.02, 0.0, 0.0], abs=1e-12)
+
+
+def test_bodies_that_would_share_a_topic_are_refused(start_node):
+    ball = AFLOAT["bodies"]["ball-1"]
+    other = ball | {"pose": {"position": [0.1, 0.1, 0.2]}}
+    with pytest.raises(ValueError, match="bodies 'ball-1' and 'ball_1' would share '~/bodies/ball_1'; rename one"):
+        start_node(AFLOAT | {"bodies": {"ball-1": ball, "ball_1": other}})
+
+
 def test_names_become_parts_of_topics():
     assert [topic_part(name) for name in ("rock", "rock-1", "2nd", "Fels größer")] == ["rock", "rock_1", "_2nd", "Fels_gr__er"]
