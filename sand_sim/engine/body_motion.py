@@ -162,12 +162,21 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
                     bit = int(wp.static(FAULT_TOO_FAST))
                 wp.atomic_or(fault, 0, bit)
                 continue
+            ease = ease_of(inertia[b])
+            before = turn[b]
+            turned = rotate_freely(before, turning, ease, wp.float64(dt))
+            turn[b] = turned
+            axes = wp.quat_to_matrix(turned)
+            past_d = mean_spin(before, turned, wp.float64(dt))
+            if wp.static(pushed):
+                if b >= unpushed:
+                    pushes[b - unpushed] = end_push(outer, before, wp.vec3d(velocity * dt), past_d * wp.float64(dt))
             x = at[0] + whole(jump[0])
             y = at[1] + whole(jump[1])
             z = at[2] + whole(jump[2])
             if wp.abs(x) > half_extent[0] or wp.abs(y) > half_extent[1] or wp.abs(z) > half_extent[2]:
                 height = -wp.dot(gravity, vec3(real(x), real(y), real(z)) * quantum)
-                spinning = spin_of(wp.quat_to_matrix(turn[b]), turning_now, ease_of(inertia[b]))
+                spinning = spin_of(axes, turning_now, ease)
                 energy = wp.float64(old[3] * (real(0.5) * wp.dot(now, now) + height))
                 wp.atomic_add(carried_off, lane, energy + wp.float64(0.5) * wp.dot(spinning, turning_now))
                 body_place[b] = whole4(parking, parking, parking, whole(0))
@@ -178,16 +187,7 @@ def build_move_bodies(recipe: Recipe) -> wp.Kernel:
             left = step - jump
             remainder[b] = left
             body_place[b] = whole4(x, y, z, at[3])
-            ease = ease_of(inertia[b])
-            before = turn[b]
-            turned = rotate_freely(before, turning, ease, wp.float64(dt))
-            turn[b] = turned
-            axes = wp.quat_to_matrix(turned)
-            past_d = mean_spin(before, turned, wp.float64(dt))
             past = vec3(real(past_d[0]), real(past_d[1]), real(past_d[2]))
-            if wp.static(pushed):
-                if b >= unpushed:
-                    pushes[b - unpushed] = end_push(outer, before, wp.vec3d(velocity * dt), past_d * wp.float64(dt))
             omega = past
             if wp.static(verlet):
                 omega_d = spin_of(axes, turning_now, ease)
