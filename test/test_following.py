@@ -47,6 +47,50 @@ def test_a_blade_turns_as_told_however_seldom_it_is_looked_at(tmp_path, turns):
         assert report.spin == pytest.approx([0.0, 0.0, 2.0 * np.pi * turns], rel=1e-6)
 
 
+@pytest.mark.parametrize(("frame_rate", "turns"), [(10.0, 8), (50.0, 8), (10.0, 3)])
+def test_a_blade_turns_and_sinks_as_a_motion_tells(tmp_path, frame_rate, turns):
+    """As many turns a second, whatever the frame rate, from one line."""
+    motion = {"time": 1.0, "velocity": [0.0, 0.0, -0.1], "spin": [0.0, 0.0, 2.0 * np.pi * turns]}
+    trajectory = [{"time": 0.05, "position": [0, 0, 0.2]}, motion]
+    plate = {"mesh": "plate.stl", "material": "steel", "particle_radius": 0.003, "max_speed": 10.0, "trajectory": trajectory}
+    world = World(load_scene(write_small_scene(tmp_path, tools={"plate": plate}, frame_rate=frame_rate)))
+    follow(world, 0.05)
+    for end in (0.1, 0.2, 0.3):
+        follow(world, end)
+        report, passed = world.observe().tool("plate"), world.time - 0.05
+        assert report.position == pytest.approx([0.0, 0.0, 0.2 - 0.1 * passed], abs=1e-6)
+        half = np.pi * turns * passed
+        assert abs(report.orientation @ [0.0, 0.0, np.sin(half), np.cos(half)]) == pytest.approx(1.0, abs=1e-6)
+        assert report.spin == pytest.approx([0.0, 0.0, 2.0 * np.pi * turns], rel=1e-6)
+
+
+def test_a_plate_vibrates_though_its_period_is_that_of_the_frames(tmp_path):
+    """``A sin(2 pi f t)``, and ``2 pi f A cos(2 pi f t)`` to a sixteenth of the peak; at each frame it is where it began."""
+    sine = {"time": 1.0, "oscillation": {"amplitude": [0.0, 0.0, 1e-3], "frequency": 20.0}}
+    plate = {"mesh": "plate.stl", "material": "steel", "particle_radius": 0.003, "max_speed": 10.0}
+    plate |= {"trajectory": [{"time": 0.0, "position": [0.0, 0.0, 0.2]}, sine]}
+    world = World(load_scene(write_small_scene(tmp_path, tools={"plate": plate}, frame_rate=20.0)))
+    follow(world, 0.05)
+    assert world.observe().tool("plate").position == pytest.approx([0.0, 0.0, 0.2], abs=2e-6)
+    for end in np.linspace(0.051, 0.1, 23):
+        follow(world, end)
+        report, phase = world.observe().tool("plate"), 2.0 * np.pi * 20.0 * world.time
+        assert report.position[2] - 0.2 == pytest.approx(1e-3 * np.sin(phase), abs=2e-6)
+        assert report.velocity[2] == pytest.approx(0.126 * np.cos(phase), abs=0.126 / 16.0)
+
+
+def test_a_motion_that_is_too_fast_is_refused_before_the_run(tmp_path):
+    """The speed of a corner of the plate: it turns on an arm of 42 mm, and swings at up to 0.63 m/s."""
+    plate = {"mesh": "plate.stl", "material": "steel", "particle_radius": 0.003, "max_speed": 1.0}
+    for motion, speed in (
+        ({"spin": [0.0, 0.0, 30.0]}, "1.3"),
+        ({"velocity": [0.0, 0.5, 0.0], "oscillation": {"amplitude": [0.0, 0.0, 1e-3], "frequency": 100.0}}, "1.13"),
+    ):
+        tools = {"plate": plate | {"trajectory": [{"time": 0.0, "position": [0.0, 0.0, 0.2]}, {"time": 1.0} | motion]}}
+        with pytest.raises(SceneError, match=rf"tools.plate.trajectory\[1\]: on the way there .* moves at {speed}"):
+            World(load_scene(write_small_scene(tmp_path, tools=tools)))
+
+
 def test_waypoints_closer_than_a_step_are_left_out(tmp_path):
     """The tool is where it should be again at the next."""
     stops = [(0.0, HIGH), (0.01, LOW), *((0.01 + 1e-7 * k, LOW) for k in range(1, 10)), (0.03, HIGH)]

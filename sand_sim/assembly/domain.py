@@ -54,9 +54,11 @@ def _lattice(
         if wall.kind == "plane":  # where grains would hit it
             corners.append(table.position - wall.distance(table.position)[:, None] * wall.direction)
     for tool in tools:
-        poses = [tool.tool.pose, *(waypoint.pose for waypoint in tool.tool.trajectory)]
-        stops = np.array([pose.position for pose in poses])
-        corners += [stops - tool.extent, stops + tool.extent]
+        track = tool.tool.trajectory
+        stops = np.array([tool.tool.pose.position, *(waypoint.pose.position for waypoint in track)])
+        swings = np.array([stop.motion.amplitude for stop in track if stop.motion] or np.zeros((1, 3)))
+        room = tool.extent + 2.0 * np.abs(swings).max(axis=0)  # a motion may end anywhere on its sine
+        corners += [stops - room, stops + room]
     corners += [wall.corners for wall in walls if wall.corners is not None]
     corners += [ground.mesh.bounds + ground.place for ground in grounds]
     corners = np.concatenate(corners)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from sand_sim.scene.reading_bodies import read_body
 from sand_sim.scene.reading_boundaries import FASTEST, read_boundary, read_corners
 from sand_sim.scene.reading_fills import read_fill
 from sand_sim.scene.reading_poses import read_pose
+from sand_sim.scene.reading_trajectory import read_trajectory
 from sand_sim.scene.types import (
     ROUGH,
     SHEETS,
@@ -32,8 +32,6 @@ from sand_sim.scene.types import (
     Settle,
     Solver,
     Tool,
-    Vector,
-    Waypoint,
 )
 
 _TOOL_FIELDS = ("mesh", "urdf", "link", "material", "particle_radius", "particle_spacing", "contact", "scale", "thickness")
@@ -184,7 +182,7 @@ def _tool(name: str, entry: Field) -> Tool:
     if not (name.isidentifier() and name.isascii()):
         raise entry.refuse("a tool's name becomes part of its topics: letters of ASCII, digits and underscores only")
     pose = entry.optional("pose", read_pose, None)
-    track = _trajectory(entry["trajectory"], pose or Pose()) if "trajectory" in entry else []
+    track = read_trajectory(entry["trajectory"], pose or Pose()) if "trajectory" in entry else []
     return Tool(
         name,
         mesh=entry.optional("mesh", Field.text, ""),
@@ -201,36 +199,6 @@ def _tool(name: str, entry: Field) -> Tool:
         max_speed=entry.optional("max_speed", lambda f: f.number(above=0.0, most=FASTEST, unit="m/s"), 2.0),
         trajectory=tuple(track),
     )
-
-
-def _trajectory(entry: Field, start: Pose) -> list[Waypoint]:
-    """Waypoints, which keep the position or the orientation of the one before, or of the start, where they name none."""
-    track, pose, angles = [], start, None
-    for stop in entry.entries():
-        stop.keys(("time", "phase", "position", "orientation", "rpy"), required=("time",))
-        time = stop["time"].number(least=0.0, unit="s")
-        if track and time <= track[-1].time:
-            raise stop["time"].refuse(f"must be later than the waypoint before, at {track[-1].time:g} s")
-        widest = {"widest": math.inf} if angles else {}  # on from there, a tool may turn as often as it likes
-        named = {key: stop.value[key] for key in ("position", "orientation", "rpy") if key in stop.value}
-        given = read_pose(Field(named, stop.path), **widest)
-        pose = replace(pose, position=given.position) if "position" in named else pose
-        if "rpy" in named or "orientation" in named:
-            pose = replace(pose, orientation=given.orientation)
-            angles = _turn_from(angles, stop["rpy"]) if "rpy" in named else None
-        track.append(Waypoint(time, pose, stop.optional("phase", Field.text, "")))
-    return track
-
-
-def _turn_from(before: Vector | None, rpy: Field) -> Vector:
-    """Angles of a waypoint [rad], to which a tool must not have to turn by half a turn: it goes the shorter way round."""
-    angles = rpy.vector()
-    if before and max(abs(a - b) for a, b in zip(angles, before, strict=True)) >= math.pi:
-        raise rpy.refuse(
-            f"is half a turn or more from {list(before)} [rad] at the waypoint before, but tools turn the shorter way round; put "
-            "waypoints in between, or if that way is meant, add 2 pi to an angle or take it away"
-        )
-    return angles
 
 
 def _contact(entry: Field) -> ContactModel:

@@ -8,6 +8,7 @@ import numpy as np
 
 from sand_sim.contact.model import ContactModel
 from sand_sim.integrator import VERLET
+from sand_sim.scene.motion import Motion
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w as in geometry_msgs
@@ -146,11 +147,12 @@ class Boundary:
 
 @dataclass(frozen=True)
 class Waypoint:
-    """A pose that a tool has at a time [s] of its trajectory, and the name of the phase that ends there."""
+    """A pose that a tool has at a time [s] of its trajectory, the name of the phase that ends there, and how it gets there."""
 
     time: float
     pose: Pose
     phase: str = ""
+    motion: Motion | None = None  # None: evenly
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from sand_sim import rotation
 from sand_sim.border import ToolPose
 from sand_sim.reach import Reach
 from sand_sim.scene.types import Pose, Scene, SceneError, Tool
@@ -18,9 +19,14 @@ def frame_times(scene: Scene, duration: float | None = None) -> Iterator[float]:
 
 
 def pose_times(scene: Scene, begin: float, end: float) -> list[float]:
-    """When poses must be told between two times for tools to pass all their waypoints: there, and at the end [s]."""
+    """When poses must be told between two times for tools to go as they should: at waypoints, in motions, at the end [s]."""
     least = 1e-6 / scene.frame_rate  # from one to the next: waypoints are meant to lie at ends of frames that are rounded
-    times = {stop.time for tool in scene.tools for stop in tool.trajectory if begin + least < stop.time < end - least}
+    first, last = begin + least, end - least
+    times = {stop.time for tool in scene.tools for stop in tool.trajectory if first < stop.time < last}
+    for before, after in (pair for tool in scene.tools for pair in pairwise(tool.trajectory)):
+        if after.motion:
+            start, until = before.time, min(last, after.time - least)
+            times.update(start + passed for passed in after.motion.stops(max(first - start, 0.0), until - start))
     return [*sorted(times), end]
 
 
@@ -55,7 +61,11 @@ def check_trajectory(tool: Tool, reach: Reach, first: float) -> None:
     """
     where, fastest = f"tools.{tool.name}", f"than its max_speed of {tool.max_speed:g} m/s"
     for number, (before, after) in enumerate(pairwise(tool.trajectory), 1):
-        speed = travel(_arrays(before.pose), _arrays(after.pose), reach) / (after.time - before.time)
+        if motion := after.motion:
+            own = rotation.rotate(rotation.inverse(before.pose.orientation), np.asarray(motion.spin))
+            speed = motion.fastest + reach.swing(own)
+        else:
+            speed = travel(_arrays(before.pose), _arrays(after.pose), reach) / (after.time - before.time)
         if speed > SPEED_TOLERANCE * tool.max_speed:
             raise SceneError(
                 f"{where}.trajectory[{number}]: on the way there a point of the tool moves at {speed:.3g} m/s, faster {fastest}; "

@@ -1,5 +1,6 @@
 """The way of a tool from one commanded pose to the next, and along the trajectory of a scene."""
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -73,7 +74,7 @@ def travel(before: tuple[np.ndarray, np.ndarray], after: tuple[np.ndarray, np.nd
 
 
 def pose_on_trajectory(waypoints: tuple[Waypoint, ...], time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Pose of a tool on a trajectory, evenly between waypoints, at rest before the first and after the last.
+    """Pose of a tool on a trajectory, at rest before the first waypoint and after the last.
 
     Args:
         waypoints: in the order of their times, at least one.
@@ -82,14 +83,16 @@ def pose_on_trajectory(waypoints: tuple[Waypoint, ...], time: float) -> tuple[np
     Returns:
         Position, shape (3,) [m], and orientation, shape (4,).
     """
-    times = [w.time for w in waypoints]
-    k = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 1))
-    after = waypoints[min(k + 1, len(times) - 1)]
-    before = waypoints[k]
-    share = 0.0 if after is before else float(np.clip((time - before.time) / (after.time - before.time), 0.0, 1.0))
-    start, end = np.asarray(before.pose.position, float), np.asarray(after.pose.position, float)
-    turn = rotation.between(np.asarray(before.pose.orientation), np.asarray(after.pose.orientation), share)
-    return start + share * (end - start), turn
+    k = bisect_right(waypoints, time, key=lambda stop: stop.time)
+    before, after = waypoints[max(k - 1, 0)], waypoints[min(k, len(waypoints) - 1)]
+    start, begin = np.asarray(before.pose.position, float), np.asarray(before.pose.orientation)
+    if after is before:
+        return start, begin
+    if after.motion:
+        return after.motion.after(start, begin, time - before.time)
+    share = (time - before.time) / (after.time - before.time)
+    way = np.asarray(after.pose.position, float) - start
+    return start + share * way, rotation.between(begin, np.asarray(after.pose.orientation), share)
 
 
 def phases_of(waypoints: tuple[Waypoint, ...]) -> dict[str, tuple[float, float]]:

@@ -158,6 +158,26 @@ def test_the_height_of_a_fill_is_that_above_its_region(low, high, fits):
             "tools.spade.trajectory[1].rpy: is half a turn or more from [0.0, 0.0, 0.0] [rad] at the waypoint before",
         ),
         (
+            ("tools", "spade", "trajectory"),
+            [{"time": 1, "spin": [0, 0, 1]}],
+            "tools.spade.trajectory[0]: a motion begins at the waypoint before",
+        ),
+        (
+            ("tools", "spade", "trajectory"),
+            [{"time": 0}, {"time": 1, "velocity": [0, 0, 1], "rpy": [0, 0, 0]}],
+            "tools.spade.trajectory[1]: give either a pose (position, orientation, rpy) or a motion",
+        ),
+        (
+            ("tools", "spade", "trajectory"),
+            [{"time": 0}, {"time": 1, "oscillation": {"amplitude": [0, 0, 0], "frequency": 1}}],
+            "tools.spade.trajectory[1].oscillation.amplitude: must not be the zero vector",
+        ),
+        (
+            ("tools", "spade", "trajectory"),
+            [{"time": 0}, {"time": 1, "oscillation": {"amplitude": [0, 0, 1e-3], "frequency": 0}}],
+            "tools.spade.trajectory[1].oscillation.frequency: must be greater than 0 and at most 1000 [Hz]",
+        ),
+        (
             ("tools", "spade", "pose"),
             {"orientation": [0, 0, 0, 1], "rpy": [0, 1, 0]},
             "tools.spade.pose: give only one of 'orientation' and 'rpy'",
@@ -262,6 +282,24 @@ def test_a_waypoint_stays_where_the_one_before_is_unless_it_says_otherwise():
     assert [pose.position for pose in poses] == [(1, 2, 2), (1, 2, 2), (3, 2, 2), (3, 2, 2)]
     turns = np.array([pose.orientation for pose in poses])
     np.testing.assert_allclose(turns, [(0, 0, 0, 1), quarter, quarter, (0, 0, 0, 1)], atol=1e-12)
+
+
+def test_a_waypoint_goes_on_from_where_a_motion_ends():
+    way = [
+        {"time": 1, "position": [1, 2, 3]},
+        {"time": 3, "velocity": [1, 0, 0], "spin": [0, 0, 2.25 * np.pi]},
+        {"time": 3.25, "oscillation": {"amplitude": [0, 0, 0.5], "frequency": 1}},
+        {"time": 4, "velocity": [0, 1, 0]},
+        {"time": 5, "rpy": [0, 0, 6]},
+    ]
+    spade = GOOD["tools"]["spade"] | {"trajectory": way}
+    poses = [stop.pose for stop in read_scene(changed(("tools", "spade"), spade), Path.cwd()).tool("spade").trajectory]
+    places = np.array([pose.position for pose in poses])
+    np.testing.assert_allclose(places, [(1, 2, 3), (3, 2, 3), (3, 2, 3.5), (3, 2.75, 3.5), (3, 2.75, 3.5)], atol=1e-12)
+    half = np.array([0.0, 2.25 * np.pi, 2.25 * np.pi, 2.25 * np.pi, 3.0])
+    meant = np.stack([0.0 * half, 0.0 * half, np.sin(half), np.cos(half)], axis=1)
+    turns = np.array([pose.orientation for pose in poses])
+    np.testing.assert_allclose(np.abs((turns * meant).sum(axis=1)), 1.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(("times", "lasts"), [((0.0, 4.0), 4.0), ((0.0,), 1.0)])

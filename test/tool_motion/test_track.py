@@ -1,9 +1,12 @@
 """The ways of tools along the trajectory of a scene."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from sand_sim import rotation
+from sand_sim.scene.motion import Motion
 from sand_sim.scene.types import Pose, Waypoint
 from sand_sim.tool_motion.track import phases_of, pose_on_trajectory
 
@@ -33,3 +36,34 @@ def test_a_screw_turns_on_and_on():
         orientation = pose_on_trajectory(tuple(screw), time)[1]
         half = 0.5 * time * turn
         assert abs(orientation @ [0.0, 0.0, np.sin(half), np.cos(half)]) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_motion_goes_on_from_the_waypoint_before_it():
+    """``x = x0 + v t + A sin(2 pi f t)`` and ``angle = w t`` about an axis of the world; before and after it rests."""
+    tilted = rotation.from_rpy(0.3, -0.4, 0.5)
+    motion = Motion((0.1, 0.0, -0.2), (0.0, 0.0, 30.0), (0.0, 0.01, 0.02), 7.0)
+    end = motion.after(np.array([1.0, 2.0, 3.0]), tilted, 2.05)
+    way = (Waypoint(1.0, Pose((1.0, 2.0, 3.0), tuple(tilted))), Waypoint(3.05, Pose(*map(tuple, end)), motion=motion))
+    for time in np.linspace(0.9, 3.2, 101):
+        position, orientation = pose_on_trajectory(way, time)
+        passed = np.clip(time - 1.0, 0.0, 2.05)
+        swung = np.sin(2.0 * np.pi * 7.0 * passed)
+        assert position == pytest.approx([1.0 + 0.1 * passed, 2.0 + 0.01 * swung, 3.0 - 0.2 * passed + 0.02 * swung], abs=1e-12)
+        meant = rotation.multiply(rotation.from_rpy(0.0, 0.0, 30.0 * passed), tilted)
+        assert abs(orientation @ meant) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_spin_is_told_less_than_half_a_turn_apart():
+    stops = [0.5, *Motion(spin=(0.0, 40.0, 30.0)).stops(0.5, 1.7), 1.7]
+    assert 0.0 < np.diff(stops).min() <= np.diff(stops).max() < 0.999 * np.pi / 50.0
+    assert Motion((1.0, 0.0, 0.0)).stops(0.0, 9.0) == []
+
+
+def test_straight_ways_between_its_stops_make_a_sine():
+    """To a thousandth of the amplitude."""
+    motion, start = Motion(amplitude=(0.0, 3e-4, 4e-4), frequency=60.0), (np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+    for before, after in pairwise([0.5, *motion.stops(0.5, 1.7), 1.7]):
+        ends = np.array([motion.after(*start, time)[0] for time in (before, after)])
+        middle = motion.after(*start, 0.5 * (before + after))[0]
+        assert before < after
+        assert np.linalg.norm(ends.mean(axis=0) - middle) <= 1e-3 * 5e-4
