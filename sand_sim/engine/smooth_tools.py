@@ -4,6 +4,9 @@ A grain near a smooth tool is listed with it once for each of ``SLOTS`` contacts
 the surface is found, then the nearest that does not belong to it, then the nearest that belongs to neither: as many contacts as a
 grain has in a corner of three walls. Each goes into the slot whose normal was like its own in the step before, so that friction
 remembers what it should.
+
+A grain that is far from the surface, or over one face of it and far from all else, is looked at again only once it has moved as
+far as it may until that could change; until then its height over that face is all there is to find.
 """
 
 from functools import cache
@@ -17,11 +20,24 @@ from sand_sim.engine.kernel import kernel
 from sand_sim.engine.neighbours import build_put_back
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.tools import ToolTrack, rotation_at, tool_types
-from sand_sim.engine.triangle_tree import TriangleTree, nearest_on_tree, plant_tree
+from sand_sim.engine.triangle_tree import MERGED, UNMERGED, TriangleTree, nearest_on_tree, plant_tree, stands_on
 from sand_sim.precision import Precision
 
 SLOTS = 3  # contacts of a grain with a smooth tool
 _SAME = 0.8  # cosine of the angle by which the normal of a contact may turn in one step
+_FAR = 0.25  # of a grain's radius beyond its reach: how far it is looked
+_NEAR = 0.05  # of it: gaps in which it is worth while to look for what else is near
+_ROUNDING = 1e-6  # of the reach, from the sides of a face: there it is the nearest beside its neighbours, however that is rounded
+
+
+@wp.struct
+class Standing:
+    """What a search for contacts has found that holds for a while; kept with the first slot of a grain and a tool."""
+
+    at: wp.vec3d  # [m] centre of the grain then, in the tool's frame
+    free: wp.float64  # [m] from there it may move so far, and find the same; 0 where it must be looked anew
+    triangle: int  # over which it is; -1 if it is far from all
+    slot: int  # of the contact with that
 
 
 class SmoothTools:
@@ -96,6 +112,7 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
         dt: wp.float64,
         quantum: wp.float64,
         across: wp.float64,
+        standing: wp.array(dtype=Standing),
         touch: wp.array(dtype=vec4),
         memory: wp.array(dtype=memory_vector),
     ):
@@ -108,19 +125,68 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
                 centre = in_tool_frame(here, states[tool], rotation, quantum)
                 radius = wp.float64(here[3]) * quantum
                 reach = radius + across
+                merged_from = wp.float64(wp.static(MERGED))
+                rounding = wp.float64(wp.static(_ROUNDING))
                 normals = wp.mat33d()
                 distances = wp.vec3d()
                 number = int(0)
-                searching = int(1)
+                searching = int(0)
+                known = standing[contact]
+                moved = centre - known.at
+                over = int(known.triangle)
+                holds = wp.dot(moved, moved) < known.free * known.free
+                if holds and over < 0:
+                    continue
+                if holds:
+                    above = wp.dot(corners[4 * over + 3], centre - corners[4 * over]) >= wp.float64(0.0)
+                    holds = above and stands_on(corners, over, centre, reach * rounding)
+                if not holds:
+                    far = reach + radius * wp.float64(wp.static(_FAR))
+                    near = reach + radius * wp.float64(wp.static(_NEAR))
+                    distance, normal, nearest = nearest_on_tree(
+                        tree, boxes, corners, centre, far, normals, distances, 0, merged_from
+                    )
+                    over = -1
+                    free = wp.max(distance - reach, wp.float64(0.0))
+                    number = int(distance < reach)
+                    normals[0] = normal
+                    distances[0] = distance
+                    # A grain whose centre is inside the tool has left all but the nearest face.
+                    if distance >= wp.float64(0.0) and distance < near:
+                        # Whatever is higher than the face below could become nearer, or a second contact.
+                        unmerged = wp.float64(wp.static(UNMERGED))
+                        rival, _n, _t = nearest_on_tree(tree, boxes, corners, centre, far, normals, distances, 1, unmerged)
+                        searching = int(number > 0 and rival < reach)
+                        room = wp.min(wp.float64(0.5) * (rival - distance), rival - reach)
+                        if room > free and stands_on(corners, nearest, centre, reach * rounding):
+                            over = nearest
+                            free = room
+                    known.at = centre
+                    known.free = free * wp.float64(0.999)
+                    known.triangle = over
+                if over >= 0:  # the same instructions, whether it has just been found or was known, give the same bits
+                    distances[0] = wp.dot(corners[4 * over + 3], centre - corners[4 * over])
+                    number = int(distances[0] < reach)
+                if holds:
+                    at = contact + known.slot
+                    if number > 0:
+                        face = corners[4 * over + 3]
+                        touch[at] = vec4(real(face[0]), real(face[1]), real(face[2]), real(radius - distances[0]))
+                    else:
+                        touch[at] = vec4(real(0.0))
+                        if wp.static(history):
+                            memory[at] = memory_vector()
+                    continue
                 while searching > 0:
-                    distance, normal = nearest_on_tree(tree, boxes, corners, centre, reach, normals, distances, number)
+                    distance, normal, _t = nearest_on_tree(
+                        tree, boxes, corners, centre, reach, normals, distances, number, merged_from
+                    )
                     searching = 0
                     if distance < reach:
                         normals[number] = normal
                         distances[number] = distance
                         number += 1
-                        # A grain whose centre is inside the tool has left all but the nearest face.
-                        if number < wp.static(SLOTS) and distance >= wp.float64(0.0):
+                        if number < wp.static(SLOTS):
                             searching = 1
                 taken = wp.vec3i(-1, -1, -1)  # contact in each slot
                 chosen = wp.vec3i(-1, -1, -1)  # slot of each contact
@@ -151,6 +217,8 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
                     normal = wp.vec3d(normals[k, 0], normals[k, 1], normals[k, 2])
                     overlap = real(radius - distances[k])
                     touch[contact + chosen[k]] = vec4(real(normal[0]), real(normal[1]), real(normal[2]), overlap)
+                known.slot = wp.max(chosen[0], 0)
+                standing[contact] = known
 
     return touch_smooth
 
@@ -194,7 +262,7 @@ def record_touching(arrays, recorder) -> None:
     if tools.smooth:
         inputs = [contacts.owner, contacts.partner, arrays.grains.place, tools.tool_of, tools.states, tools.tracks]
         inputs += [*arguments_of(tools.smooth), arrays.flags.steps_done, arrays.setting.dt, arrays.lattice.quantum]
-        inputs += [arrays.widest_reach, arrays.touch, contacts.memory]
+        inputs += [arrays.widest_reach, arrays.standing, arrays.touch, contacts.memory]
         recorder.each(build_touch_smooth(arrays.recipe), contacts.pairs, inputs)
 
 

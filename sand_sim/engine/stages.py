@@ -171,6 +171,7 @@ def tool_list_stage(arrays: DemArrays, recorder) -> None:
             tools.cell_starts,
             tools.particles,
             *arguments_of(tools.smooth),
+            arrays.standing,
         ]
         inputs += [arrays.lattice.quantum, arrays.skin.widest, arrays.cells.levels, *_list_arguments(arrays, arrays.tool_list)]
         recorder.each(tool_contacts.build_tool_search(arrays.recipe, filling), grains.active, inputs)

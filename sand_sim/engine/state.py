@@ -119,4 +119,6 @@ def _filled_arrays(arrays: DemArrays) -> dict[str, tuple[wp.array, Count]]:
                 found[f"{name}.{part}"] = (getattr(contacts, part), contacts.pairs)
     if arrays.old_touch is not None:
         found["tool.touch"] = (arrays.touch, arrays.tool_list.pairs)
+    if arrays.standing is not None:
+        found["tool.standing"] = (arrays.standing, arrays.tool_list.pairs)
     return found

@@ -3,6 +3,7 @@
 import numpy as np
 
 from sand_sim.engine.arrays import DemArrays
+from sand_sim.engine.smooth_tools import SLOTS
 
 
 class StateError(ValueError):
@@ -68,6 +69,10 @@ def check_numbers(arrays: DemArrays, state: dict[str, np.ndarray]) -> None:
         member = state["grains.member"]
         if member.min() < -1 or member.max() >= arrays.bodies.members:
             raise StateError("array 'grains.member' points outside")
+    if arrays.standing is not None:
+        standing = state["tool.standing"]
+        _within("tool.standing", standing["triangle"] + 1, arrays.tools.smooth.corners.shape[0] // 4 + 1)
+        _within("tool.standing", standing["slot"], SLOTS)
     if min(int(state["flags.steps_done"][0]), int(state["observed_steps"])) < 0:
         raise StateError("array 'flags.steps_done' is negative")
 
@@ -75,7 +80,7 @@ def check_numbers(arrays: DemArrays, state: dict[str, np.ndarray]) -> None:
 def _length(state: dict[str, np.ndarray], name: str, like: np.ndarray) -> int:
     """How long an array must be."""
     kind, _, part = name.partition(".")
-    if part in ("owner", "partner", "memory", "touch") or name == "met.order":
+    if part in ("owner", "partner", "memory", "touch", "standing") or name == "met.order":
         return int(state["pair.number" if kind == "met" else f"{kind}.number"])
     return len(like)
 

@@ -17,9 +17,9 @@ from sand_sim.engine.count import count_of, part_start
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.pair_contact import build_direction
 from sand_sim.engine.recipe import Recipe
-from sand_sim.engine.smooth_tools import SLOTS
+from sand_sim.engine.smooth_tools import SLOTS, Standing
 from sand_sim.engine.tools import tool_types
-from sand_sim.engine.triangle_tree import TriangleTree, nearest_on_tree
+from sand_sim.engine.triangle_tree import MERGED, TriangleTree, nearest_on_tree
 from sand_sim.precision import Precision
 
 SUM_BLOCK = 128  # contacts per partial sum of a wrench; fixed, so that the sum does not depend on the number of shares
@@ -66,6 +66,7 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
         trees: wp.array(dtype=TriangleTree),
         boxes: wp.array(dtype=wp.vec3d),
         corners: wp.array(dtype=wp.vec3d),
+        standing: wp.array(dtype=Standing),
         quantum: real,
         skin: wp.array(dtype=wp.float64),
         levels: wp.array(dtype=level),
@@ -102,8 +103,11 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                     if tree.leaves > 0:
                         at = wp.vec3d(wp.float64(local[0]), wp.float64(local[1]), wp.float64(local[2]))
                         limit = wp.float64(reach)
-                        distance, _normal = nearest_on_tree(tree, boxes, corners, at, limit, wp.mat33d(), wp.vec3d(), 0)
+                        none, merged_from = wp.mat33d(), wp.float64(wp.static(MERGED))
+                        distance, _n, _t = nearest_on_tree(tree, boxes, corners, at, limit, none, wp.vec3d(), 0, merged_from)
                         if distance < limit:
+                            if wp.static(filling):
+                                standing[found] = Standing()
                             for slot in range(wp.static(SLOTS)):
                                 found = note(
                                     found,

@@ -11,7 +11,8 @@ import warp as wp
 from sand_sim.engine.count import part_start
 
 _IN_LEAF = 4  # triangles at most
-_MERGED = math.cos(math.radians(30.0))
+MERGED = math.cos(math.radians(30.0))  # cosine between directions of one contact at least
+UNMERGED = 2.0  # in place of it: by its direction alone nothing belongs to a contact
 
 
 @wp.struct
@@ -107,16 +108,31 @@ def nearest_on_triangle(p: wp.vec3d, a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, face
 
 
 @wp.func
-def is_merged(away: wp.vec3d, distance: wp.float64, normals: wp.mat33d, distances: wp.vec3d, number: int) -> bool:
+def stands_on(corners: wp.array(dtype=wp.vec3d), triangle: int, p: wp.vec3d, margin: wp.float64) -> bool:
+    """Whether the perpendicular from a point meets a triangle farther than ``margin`` [m] from its sides."""
+    a = corners[4 * triangle]
+    b = corners[4 * triangle + 1]
+    c = corners[4 * triangle + 2]
+    face = corners[4 * triangle + 3]
+    on_ab = wp.dot(wp.cross(face, b - a), p - a) > margin * wp.length(b - a)
+    on_bc = wp.dot(wp.cross(face, c - b), p - b) > margin * wp.length(c - b)
+    return on_ab and on_bc and wp.dot(wp.cross(face, a - c), p - c) > margin * wp.length(a - c)
+
+
+@wp.func
+def is_merged(
+    away: wp.vec3d, distance: wp.float64, normals: wp.mat33d, distances: wp.vec3d, number: int, merged_from: wp.float64
+) -> bool:
     """Whether a place of the surface belongs to one of the contacts found before.
 
-    It does where its direction is within 30 degrees of the contact's, so that the facets of a rounded hollow are one contact; and
-    where it lies no higher than the contact's tangent plane, which goes for all of a surface that is flat or bulges there.
+    It does where the cosine between its direction and the contact's is greater than ``merged_from``, so that the facets of a
+    rounded hollow are one contact; and where it lies no higher than the contact's tangent plane, which goes for all of a surface
+    that is flat or bulges there.
     """
     merged = int(0)
     for k in range(number):
         along = wp.dot(away, normals[k])
-        if along > wp.float64(wp.static(_MERGED)) * distance or along > wp.float64(0.999999) * distances[k]:
+        if along > merged_from * distance or along > wp.float64(0.999999) * distances[k]:
             merged = 1
     return merged > 0
 
@@ -131,15 +147,17 @@ def nearest_on_tree(
     normals: wp.mat33d,
     distances: wp.vec3d,
     number: int,
+    merged_from: wp.float64,
 ):
-    """Distance [m] of the nearest place that belongs to none of the ``number`` contacts found before, and its normal.
+    """Distance [m] of the nearest place that belongs to none of the ``number`` contacts found before, its normal and triangle.
 
-    The distance is negative behind a face, and ``limit`` where nothing is nearer.
+    The distance is negative behind a face, and ``limit`` where nothing is nearer; the triangle is -1 then.
     """
     least = limit
     nearest = limit
     slack = limit * wp.float64(1.0e-12)
     normal = wp.vec3d(wp.float64(0.0))
+    triangle = int(-1)
     node = int(1)
     while node > 0:
         low = boxes[2 * (tree.first_node + node)]
@@ -163,13 +181,14 @@ def nearest_on_tree(
                         # Of a wall without thickness, which is there both ways, the side that faces the grain.
                         before = wp.abs(distance) < least + slack and distance > nearest and nearest < wp.float64(0.0)
                         if wp.abs(distance) < least or before:
-                            if number == 0 or not is_merged(way * distance, distance, normals, distances, number):
+                            if number == 0 or not is_merged(way * distance, distance, normals, distances, number, merged_from):
                                 least = wp.abs(distance)
                                 nearest = distance
                                 normal = way
+                                triangle = k
             node += 1
             while node % 2 == 0:
                 node = node // 2
             if node == 1:
                 node = 0
-    return nearest, normal
+    return nearest, normal, triangle

@@ -274,6 +274,55 @@ def test_saved_state_goes_on_to_the_bit_on_any_number_of_threads(make_smooth_wor
     assert differ <= {"tools.impulse", "start", "observed_steps", "observed_wrench"}  # since the last observation
 
 
+def drum():
+    """A ring with an inner radius of 40 mm about y, of 48 slender facets that hollow it out."""
+    ring = trimesh.creation.annulus(0.04, 0.043, 0.06, sections=48)
+    ring.apply_transform(trimesh.transformations.rotation_matrix(0.5 * np.pi, [1.0, 0.0, 0.0]))
+    return ring
+
+
+@pytest.mark.parametrize(("mesh", "least_known"), [(tray, 0.5), (drum, 0.3), (plate, 0.3)], ids=["tray", "drum", "plate"])
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_what_is_known_of_the_surface_is_what_a_search_would_find(make_smooth_world, mesh, least_known, precision):
+    """To the bit, with grains that slide, roll, bounce and lie in corners and over edges of a tool that turns and swings."""
+    lattice = np.stack(np.meshgrid(range(-2, 3), range(-2, 3), range(2), indexing="ij"), -1).reshape(-1, 3)
+    middle = {tray: [0.035, 0.03, 0.008], drum: [0.0, 0.0, -0.02], plate: [0.03, 0.01, 0.007]}[mesh]
+    common = {"gravity": [-1.0, -2.0, -9.81], "precision": precision, "friction": 0.4, "velocity": [0.0, 0.0, -0.3]}
+    worlds = [make_smooth_world(0.0103 * lattice + middle, mesh(), **common) for _ in range(2)]
+    known, contacts = [], []
+    for turn in range(3):
+        for world in worlds:
+            way, angle = [0.004 * turn, -0.003, 0.001 * turn], 0.06 * (turn + 1)
+            world.apply(ToolPose("tool", np.array(way), np.array([0.0, np.sin(angle), 0.0, np.cos(angle)]), world.time + 0.02))
+        knowing, searching = worlds
+        for _ in range(round(0.02 / knowing.time_step)):
+            before = knowing.assembly.solver.arrays.standing.numpy()["at"].copy()
+            knowing.step(1)
+            searching.assembly.solver.arrays.standing.zero_()
+            searching.step(1)
+            arrays = knowing.assembly.solver.arrays
+            listed = min(arrays.tool_list.pairs.get(), len(before))
+            if listed:
+                known.append((arrays.standing.numpy()["at"][:listed:3] == before[:listed:3]).all(axis=1).mean())
+        states = [world.save() for world in worlds]
+        for name in ("grains.place", "grains.half_motion", "grains.half_spin", "tool.touch", "tools.wrench"):
+            assert states[0][name].tobytes() == states[1][name].tobytes(), name
+        contacts.append(len(knowing.tool_contacts("tool")))
+    assert max(contacts) >= 10
+    assert np.mean(known) > least_known
+
+
+def test_a_state_that_points_to_faces_which_are_not_there_is_refused(make_smooth_world):
+    world = make_smooth_world([[0.02, 0.02, RADIUS]], tray(), gravity=[0.0, 0.0, -GRAVITY])
+    world.step(100)
+    for field, number in (("triangle", 10**6), ("triangle", -2), ("slot", 3), ("slot", -1)):
+        state = world.save()
+        state["tool.standing"][field] = number
+        with pytest.raises(ValueError, match=r"array 'tool\.standing' points outside"):
+            world.check_state(state)
+    world.check_state(world.save())
+
+
 def test_a_sheet_is_as_thick_as_asked(make_smooth_world):
     """A plate modelled as a surface without thickness, 3 mm thick, carries a grain 1.5 mm above that surface."""
     sheet = trimesh.Trimesh(
