@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scenes import write_small_scene
 
-from sand_sim import World, load_scene
+from sand_sim import World, follow, frame_times, load_scene
 from sand_sim.scene.walls import Wall
-from sand_sim.sinks.run_log import RunLog
+from sand_sim.sinks.run_log import RunLog, View
 from sand_sim.sinks.wall_mesh import wall_mesh
 
 rr = pytest.importorskip("rerun")
@@ -108,6 +108,38 @@ def test_a_figure_shows_where_bins_are_cut(tmp_path):
     assert lines == {((0.0, 0.0), (0.0, 0.2)), ((0.3, 0.0), (0.3, 0.2)), ((0.0, 0.0), (0.3, 0.0))}
     assert all((line[:, 1] == 0.05).all() for line in bin_sections(scene, 0.05))
     assert not bin_sections(scene, 0.15)
+    across = {tuple(map(tuple, line[:, [0, 2]].round(9))) for line in bin_sections(scene, -0.1, sideways=True)}  # at x = 0.1
+    assert across == {((-0.1, 0.0), (-0.1, 0.2)), ((0.1, 0.0), (0.1, 0.2)), ((-0.1, 0.0), (0.1, 0.0))}
+    assert not bin_sections(scene, 0.1, sideways=True)
+
+
+@pytest.mark.parametrize(
+    ("motion", "sideways"),
+    [
+        ({"velocity": [0.1, 0.05, 0.0]}, False),
+        ({"velocity": [0.05, -0.1, 0.0]}, True),
+        ({"spin": [0.0, 9.0, 0.0]}, False),
+        ({"spin": [9.0, 0.0, 0.0]}, True),
+        ({"velocity": [0.0, 0.0, 0.1]}, False),
+    ],
+)
+def test_a_figure_looks_across_the_way_that_tools_go(tmp_path, motion, sideways):
+    """Along y, or where they go along y or roll about x, along x; what lies along y is to the right then."""
+    pytest.importorskip("matplotlib")
+    from sand_sim.sinks.figure import draw_run, go_sideways, turned
+
+    way = [{"time": 0.0, "position": [0.0, 0.0, 0.06]}, {"time": 0.1} | motion]
+    plate = {"mesh": "plate.stl", "material": "steel", "particle_radius": 0.003, "trajectory": way}
+    world = World(load_scene(write_small_scene(tmp_path, tools={"plate": plate})))
+    log = RunLog(world.scene)
+    for end in frame_times(world.scene):
+        follow(world, end)
+        log.write(world.observe())
+    assert go_sideways(log.columns(), world.tools) == sideways
+    view, seen = View.of(log.last), turned(View.of(log.last))
+    np.testing.assert_allclose(seen.position, view.position[:, [1, 0, 2]] * [1.0, -1.0, 1.0], atol=1e-12)
+    draw_run(log, world.tools, tmp_path / "run.png")
+    assert (tmp_path / "run.png").stat().st_size > 10000
 
 
 def test_a_viewer_that_is_open_takes_the_views_of_the_run(tmp_path):

@@ -1,5 +1,7 @@
 """A still picture of a run: wrench against time beside cut-away views of the bed and the tools. Needs matplotlib."""
 
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ from sand_sim.sinks.run_log import RunLog, View
 _VIEWS = 3
 _TILT = np.radians(14.0)  # of the view from the horizontal
 _STEEL = np.array([0.52, 0.56, 0.64])
+_QUARTER = rotation.from_rpy(0.0, 0.0, -0.5 * np.pi)  # brings y to where x is seen
 _LIGHT = np.array([-0.35, -0.55, 0.76])
 
 
@@ -37,9 +40,11 @@ def draw_run(log: RunLog, tools: list[ToolModel], path: Path) -> None:
     _draw_curves(left, columns, log)
     fastest = fastest_shown(log.scene)
     right.suptitle(f"grains by speed, from sand (at rest) to dark red ({fastest:g} m/s)", fontsize=9, x=0.02, ha="left")
-    axes = np.atleast_1d(right.subplots(len(views), 1))
+    axes, sideways = np.atleast_1d(right.subplots(len(views), 1)), go_sideways(columns, tools)
     for axis, (_, view) in zip(axes, views, strict=True):
-        _draw_view(axis, view, tools, fastest, bin_sections(log.scene, _cut(view)))
+        seen = turned(view) if sideways else view
+        _draw_view(axis, seen, tools, fastest, bin_sections(log.scene, _cut(seen), sideways))
+        axis.set_xlabel("y [m]" if sideways else "x [m]", fontsize=8)
     limits = np.array([[axis.get_xlim(), axis.get_ylim()] for axis in axes])
     low, high = limits[..., 0].min(axis=0), limits[..., 1].max(axis=0)
     for axis, (name, view) in zip(axes, views, strict=True):
@@ -60,17 +65,37 @@ def pick_views(log: RunLog) -> list[tuple[str, View]]:
     return views[-_VIEWS:]
 
 
-def bin_sections(scene: Scene, cut: float) -> list[np.ndarray]:
-    """Where the plane at a place along y cuts the sides of bins: the ends of lines, shape (2, 3) [m]."""
+def go_sideways(columns: dict[str, np.ndarray], tools: list[ToolModel]) -> bool:
+    """Whether tools go along y, and turn that way, farther than along x, so that they are looked at along x."""
+    along = np.zeros(2)
+    for model in tools:
+        place, turns = columns[f"{model.tool.name}.position"], columns[f"{model.tool.name}.orientation"]
+        along += np.abs(np.diff(place[:, :2], axis=0)).sum(axis=0)
+        for before, after in pairwise(turns):
+            turn = rotation.to_vector(rotation.multiply(after, rotation.inverse(before)))
+            along += model.extent * np.abs(turn[[1, 0]])  # about y points go along x
+    return bool(along[1] > along[0])
+
+
+def turned(view: View) -> View:
+    """A view whose y lies where x is seen."""
+    places = {name: rotation.rotate(_QUARTER, getattr(view, name)) for name in ("position", "tool_position")}
+    return replace(view, **places, tool_orientation=rotation.multiply(_QUARTER, view.tool_orientation))
+
+
+def bin_sections(scene: Scene, cut: float, sideways: bool = False) -> list[np.ndarray]:
+    """Where the plane at a place along the line of sight cuts the sides of bins: the ends of lines, shape (2, 3) [m]."""
     lines = []
     for wall in [wall for boundary in scene.boundaries for wall in walls_of(boundary)]:
-        if wall.kind == "panel" and wall.corners[0, 1] < cut < wall.corners[1, 1]:
-            lines.append(np.column_stack([wall.corners[:, 0], np.full(2, cut), wall.corners[:, 2]]))
+        if wall.kind == "panel":
+            corners = np.sort(rotation.rotate(_QUARTER, wall.corners), axis=0) if sideways else wall.corners
+            if corners[0, 1] < cut < corners[1, 1]:
+                lines.append(np.column_stack([corners[:, 0], np.full(2, cut), corners[:, 2]]))
     return lines
 
 
 def _cut(view: View) -> float:
-    """Before which place along y nothing is drawn [m]."""
+    """Before which place along the line of sight nothing is drawn [m]."""
     return view.tool_position[0, 1] if len(view.tool_position) else -np.inf
 
 
@@ -148,7 +173,6 @@ def _draw_view(axis, view: View, tools: list[ToolModel], fastest: float, walls: 
         axis.set_xlim(low[0] - pad, high[0] + pad)
         axis.set_ylim(low[1] - pad, high[1] + pad)
     axis.set_aspect("equal")
-    axis.set_xlabel("x [m]", fontsize=8)
     axis.tick_params(labelsize=7)
     axis.set_yticks([])
     for side in ("top", "left", "right"):
