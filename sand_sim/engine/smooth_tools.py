@@ -153,14 +153,17 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
                     distances[0] = distance
                     # A grain whose centre is inside the tool has left all but the nearest face.
                     if distance >= wp.float64(0.0) and distance < near:
-                        # Whatever is higher than the face below could become nearer, or a second contact.
-                        unmerged = wp.float64(wp.static(UNMERGED))
-                        rival, _n, _t = nearest_on_tree(tree, boxes, corners, centre, far, normals, distances, 1, unmerged)
-                        searching = int(number > 0 and rival < reach)
-                        room = wp.min(wp.float64(0.5) * (rival - distance), rival - reach)
-                        if room > free and stands_on(corners, nearest, centre, reach * rounding):
-                            over = nearest
-                            free = room
+                        searching = number
+                        if stands_on(corners, nearest, centre, reach * rounding):
+                            # Whatever is higher than the face below could become nearer, or a second contact.
+                            unmerged = wp.float64(wp.static(UNMERGED))
+                            rival, _n, _t = nearest_on_tree(tree, boxes, corners, centre, far, normals, distances, 1, unmerged)
+                            if rival >= reach:
+                                searching = 0
+                            room = wp.min(wp.float64(0.5) * (rival - distance), rival - reach)
+                            if room > free:
+                                over = nearest
+                                free = room
                     known.at = centre
                     known.free = free * wp.float64(0.999)
                     known.triangle = over
