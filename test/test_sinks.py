@@ -342,5 +342,6 @@ def test_columns_of_the_history_are_those_that_are_documented(tmp_path):
     log.save_history(tmp_path / "history.npz")
     document = (Path(__file__).parents[1] / "docs" / "python.md").read_text(encoding="utf-8")
     for name in np.load(tmp_path / "history.npz").files:
-        told = name.replace("plate.", "TOOL.").replace("press.", "PLUNGER.")
+        told = name.replace("plate.", "TOOL.").replace("wall.press.position", "wall.PLUNGER.position")
+        told = told.replace("wall.press.", "wall.WALL.").replace("wall.floor.", "wall.WALL.")
         assert f"`{told}`" in document or name.startswith("bed.")

@@ -78,3 +78,34 @@ def test_a_tool_that_met_no_grain_is_told(tmp_path, pull):
     log.write(replace(first, steps=2))
     text = summary_text(log.summarise())
     assert ("plate  " in text, "met no grain" in text, "plate: peak lift" in text) == (not pull, not pull, bool(pull))
+
+
+def test_the_history_holds_what_walls_bear(tmp_path):
+    """Floor, sides and plunger of a box together bear the weight of the bed; a log goes on from what another has packed."""
+    box = {"type": "box", "name": "bin", "material": "steel", "low": [-0.005, -0.005, 0.0], "high": [0.04, 0.04, 0.1]}
+    lid = {
+        "type": "plunger",
+        "name": "lid",
+        "material": "steel",
+        "point": [0.0, 0.0, 0.05],
+        "normal": [0.0, 0.0, -1.0],
+        "force": 0.5,
+    }
+    lid |= {"max_speed": 0.1}
+    box |= {"open": ["top"]}
+    world = World(load_scene(write_small_scene(tmp_path, boundaries=[box, lid], settle={"time": 0.2}, tools={})))
+    log = RunLog(world.scene)
+    for _ in range(30):
+        world.step(world.frame_steps)
+        log.write(world.observe())
+    columns = log.columns()
+    names = [name for name in columns if name.endswith(".force")]
+    assert set(names) == {f"wall.bin/{side}.force" for side in ("front", "back", "left", "right", "bottom")} | {"wall.lid.force"}
+    assert columns["wall.lid.position"].shape == columns["wall.lid.force"].shape == (30, 3)
+    weight = 9.81 * float(log.last.grains.mass.sum())
+    borne = np.sum([columns[name] for name in names], axis=0)[-5:].mean(axis=0)
+    assert borne == pytest.approx([0.0, 0.0, -weight], abs=0.02 * weight)
+    assert columns["wall.lid.force"][-5:, 2].mean() == pytest.approx(0.5, rel=0.02)
+    again = RunLog(world.scene)
+    again.unpack(log.pack())
+    assert again.columns().keys() == columns.keys()

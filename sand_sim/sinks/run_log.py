@@ -11,14 +11,14 @@ import numpy as np
 from sand_sim.border import Observation, ToolReport
 from sand_sim.readout.trust import kind_of
 from sand_sim.scene.types import Scene, Tool
+from sand_sim.scene.walls import walls_of
 from sand_sim.tool_motion.track import phases_at, phases_of
 
 _STILL = 1e-4  # [m/s] horizontal speed below which a tool has no draft
-# What each row holds of the world's health, of every tool, by the attribute of its report, and of every plunger.
+# What each row holds of the world's health, and of every tool, by the attribute of its report.
 _PEAKS_OF_HEALTH = "momentum_residual", "gained"
 _OF_HEALTH = ("contacts", "deepest", "kinetic", "dissipated", "momentum_residual")
 _OF_TOOL = {name: name for name in ("position", "orientation", "velocity", "torque", "carried")} | {"force": "world_force"}
-_OF_PLUNGER = ("position", "force")
 _LOADS = "force_N", "draft_N", "pull_N", "lift_N", "bearing_N", "torque_Nm"
 
 
@@ -108,8 +108,11 @@ class RunLog:
         row = {"time": observation.time, "wall": time.monotonic() - self.started, "steps": observation.steps}
         row |= {name: getattr(health, name) for name in _OF_HEALTH}
         row |= {f"{tool.name}.{name}": getattr(tool, part) for tool in observation.tools for name, part in _OF_TOOL.items()}
-        plungers = [wall for wall in observation.walls if wall.name in self._plungers]
-        self.rows.append(row | {f"wall.{one.name}.{part}": getattr(one, part) for one in plungers for part in _OF_PLUNGER})
+        for wall in observation.walls:  # those of one name are one
+            row[f"wall.{wall.name}.force"] = row.get(f"wall.{wall.name}.force", 0.0) + wall.force
+            if wall.name in self._plungers:
+                row[f"wall.{wall.name}.position"] = wall.position
+        self.rows.append(row)
         if len(self.rows) > self.most_rows:
             self.rows, self._every = self.rows[::2], 2 * self._every
 
@@ -121,7 +124,9 @@ class RunLog:
     def _names(self) -> set[str]:
         """Of all columns."""
         names = {"time", "wall", "steps", *_OF_HEALTH} | {f"{tool.name}.{name}" for tool in self.scene.tools for name in _OF_TOOL}
-        return names | {f"wall.{name}.{part}" for name in self._plungers for part in _OF_PLUNGER}
+        boundaries = self.scene.boundaries
+        walls = [*(wall for one in boundaries for wall in walls_of(one)), *(one for one in boundaries if one.terrain)]
+        return names | {f"wall.{one.name}.force" for one in walls} | {f"wall.{name}.position" for name in self._plungers}
 
     @property
     def _peak_names(self) -> set[str]:
