@@ -199,14 +199,17 @@ def build_tool_forces(recipe: Recipe, measuring: bool = False) -> wp.Kernel:
             state = states[tool]
             shape = shapes[tool]
             here = place[i]
-            arm = wp.quat_rotate(state.rotation, particles[j])
-            apart = from_tool(here, state, quantum) - arm
             radius = real(here[3]) * quantum
             reach = radius + shape.radius
-            touching = wp.dot(apart, apart) < reach * reach
+            arm = vec3(real(0.0))
+            apart = from_tool(here, state, quantum)
+            touching = False
             if wp.static(smooth):
-                if shape.radius == real(0.0):
-                    touching = touch[contact][3] > real(0.0)
+                touching = touch[contact][3] > real(0.0)
+            if shape.radius > real(0.0):
+                arm = wp.quat_rotate(state.rotation, particles[j])
+                apart -= arm
+                touching = wp.dot(apart, apart) < reach * reach
             if acts(contact, touching, memory):
                 normal, distance = direction(apart)
                 overlap = reach - distance
