@@ -116,12 +116,16 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
         touch: wp.array(dtype=vec4),
         memory: wp.array(dtype=memory_vector),
     ):
+        turned = int(-1)  # the tool whose rotation it is
+        rotation = wp.quatd()
         for contact in range(spans[lane] + wp.tid(), spans[lane + 1], stride):
             tool = tool_of[partner[contact]]
             tree = trees[tool]
             if tree.leaves > 0 and partner[contact] == tree.first_slot:
                 here = place[owner[contact]]
-                rotation = rotation_at(tracks[tool], wp.float64(steps_done[0]) * dt)
+                if turned != tool:
+                    turned = tool
+                    rotation = rotation_at(tracks[tool], wp.float64(steps_done[0]) * dt)
                 centre = in_tool_frame(here, states[tool], rotation, quantum)
                 radius = wp.float64(here[3]) * quantum
                 reach = radius + across
