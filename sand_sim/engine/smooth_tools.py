@@ -20,7 +20,7 @@ from sand_sim.engine.kernel import kernel
 from sand_sim.engine.neighbours import build_put_back
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.tools import ToolTrack, rotation_at, tool_types
-from sand_sim.engine.triangle_tree import MERGED, UNMERGED, TriangleTree, nearest_on_tree, plant_tree, stands_on
+from sand_sim.engine.triangle_tree import TriangleTree, nearest_on_tree, plant_tree, stands_on
 from sand_sim.precision import Precision
 
 SLOTS = 3  # contacts of a grain with a smooth tool
@@ -129,7 +129,6 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
                 centre = in_tool_frame(here, states[tool], rotation, quantum)
                 radius = wp.float64(here[3]) * quantum
                 reach = radius + across
-                merged_from = wp.float64(wp.static(MERGED))
                 rounding = wp.float64(wp.static(_ROUNDING))
                 normals = wp.mat33d()
                 distances = wp.vec3d()
@@ -147,9 +146,7 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
                 if not holds:
                     far = reach + radius * wp.float64(wp.static(_FAR))
                     near = reach + radius * wp.float64(wp.static(_NEAR))
-                    distance, normal, nearest = nearest_on_tree(
-                        tree, boxes, corners, centre, far, normals, distances, 0, merged_from
-                    )
+                    distance, normal, nearest = nearest_on_tree(tree, boxes, corners, centre, far, normals, distances, 0, False)
                     over = -1
                     free = wp.max(distance - reach, wp.float64(0.0))
                     number = int(distance < reach)
@@ -160,8 +157,7 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
                         searching = number
                         if stands_on(corners, nearest, centre, reach * rounding):
                             # Whatever is higher than the face below could become nearer, or a second contact.
-                            unmerged = wp.float64(wp.static(UNMERGED))
-                            rival, _n, _t = nearest_on_tree(tree, boxes, corners, centre, far, normals, distances, 1, unmerged)
+                            rival, _n, _t = nearest_on_tree(tree, boxes, corners, centre, far, normals, distances, 1, True)
                             if rival >= reach:
                                 searching = 0
                             room = wp.min(wp.float64(0.5) * (rival - distance), rival - reach)
@@ -185,9 +181,7 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
                             memory[at] = memory_vector()
                     continue
                 while searching > 0:
-                    distance, normal, _t = nearest_on_tree(
-                        tree, boxes, corners, centre, reach, normals, distances, number, merged_from
-                    )
+                    distance, normal, _t = nearest_on_tree(tree, boxes, corners, centre, reach, normals, distances, number, False)
                     searching = 0
                     if distance < reach:
                         normals[number] = normal

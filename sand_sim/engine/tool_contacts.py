@@ -19,7 +19,7 @@ from sand_sim.engine.pair_contact import build_direction
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.smooth_tools import SLOTS, Standing
 from sand_sim.engine.tools import tool_types
-from sand_sim.engine.triangle_tree import MERGED, TriangleTree, nearest_on_tree
+from sand_sim.engine.triangle_tree import TriangleTree, nearest_on_tree
 from sand_sim.precision import Precision
 
 SUM_BLOCK = 128  # contacts per partial sum of a wrench; fixed, so that the sum does not depend on the number of shares
@@ -103,8 +103,8 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                     if tree.leaves > 0:
                         at = wp.vec3d(wp.float64(local[0]), wp.float64(local[1]), wp.float64(local[2]))
                         limit = wp.float64(reach)
-                        none, merged_from = wp.mat33d(), wp.float64(wp.static(MERGED))
-                        distance, _n, _t = nearest_on_tree(tree, boxes, corners, at, limit, none, wp.vec3d(), 0, merged_from)
+                        none = wp.mat33d()
+                        distance, _n, _t = nearest_on_tree(tree, boxes, corners, at, limit, none, wp.vec3d(), 0, False)
                         if distance < limit:
                             if wp.static(filling):
                                 standing[found] = Standing()

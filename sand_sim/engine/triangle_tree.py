@@ -11,8 +11,8 @@ import warp as wp
 from sand_sim.engine.count import part_start
 
 _IN_LEAF = 4  # triangles at most
-MERGED = math.cos(math.radians(30.0))  # cosine between directions of one contact at least
-UNMERGED = 2.0  # in place of it: by its direction alone nothing belongs to a contact
+_MERGED = math.cos(math.radians(30.0))
+_FLAT = 1e-9  # of the distance searched: corners that rise less above a face lie in its plane, which is rounded
 
 
 @wp.struct
@@ -120,21 +120,29 @@ def stands_on(corners: wp.array(dtype=wp.vec3d), triangle: int, p: wp.vec3d, mar
 
 
 @wp.func
-def is_merged(
-    away: wp.vec3d, distance: wp.float64, normals: wp.mat33d, distances: wp.vec3d, number: int, merged_from: wp.float64
-) -> bool:
+def is_merged(away: wp.vec3d, distance: wp.float64, normals: wp.mat33d, distances: wp.vec3d, number: int) -> bool:
     """Whether a place of the surface belongs to one of the contacts found before.
 
-    It does where the cosine between its direction and the contact's is greater than ``merged_from``, so that the facets of a
-    rounded hollow are one contact; and where it lies no higher than the contact's tangent plane, which goes for all of a surface
-    that is flat or bulges there.
+    It does where its direction is within 30 degrees of the contact's, so that the facets of a rounded hollow are one contact; and
+    where it lies no higher than the contact's tangent plane, which goes for all of a surface that is flat or bulges there.
     """
     merged = int(0)
     for k in range(number):
         along = wp.dot(away, normals[k])
-        if along > merged_from * distance or along > wp.float64(0.999999) * distances[k]:
+        if along > wp.float64(wp.static(_MERGED)) * distance or along > wp.float64(0.999999) * distances[k]:
             merged = 1
     return merged > 0
+
+
+@wp.func
+def rises(
+    corners: wp.array(dtype=wp.vec3d), triangle: int, p: wp.vec3d, normal: wp.vec3d, distance: wp.float64, slack: wp.float64
+) -> bool:
+    """Whether any of a triangle is higher than the plane that lies at a distance below a point."""
+    height = wp.dot(normal, p) - distance + slack
+    on_a = wp.dot(normal, corners[4 * triangle]) > height
+    on_b = wp.dot(normal, corners[4 * triangle + 1]) > height
+    return on_a or on_b or wp.dot(normal, corners[4 * triangle + 2]) > height
 
 
 @wp.func
@@ -147,11 +155,12 @@ def nearest_on_tree(
     normals: wp.mat33d,
     distances: wp.vec3d,
     number: int,
-    merged_from: wp.float64,
+    rivals: bool,
 ):
     """Distance [m] of the nearest place that belongs to none of the ``number`` contacts found before, its normal and triangle.
 
-    The distance is negative behind a face, and ``limit`` where nothing is nearer; the triangle is -1 then.
+    The distance is negative behind a face, and ``limit`` where nothing is nearer; the triangle is -1 then. With ``rivals`` it is
+    that of the nearest triangle which rises above the tangent plane of the one contact found before, wherever it does.
     """
     least = limit
     nearest = limit
@@ -181,7 +190,13 @@ def nearest_on_tree(
                         # Of a wall without thickness, which is there both ways, the side that faces the grain.
                         before = wp.abs(distance) < least + slack and distance > nearest and nearest < wp.float64(0.0)
                         if wp.abs(distance) < least or before:
-                            if number == 0 or not is_merged(way * distance, distance, normals, distances, number, merged_from):
+                            counts = number == 0
+                            if rivals:
+                                flat = limit * wp.float64(wp.static(_FLAT))
+                                counts = rises(corners, k, p, normals[0], distances[0], flat)
+                            elif number > 0:
+                                counts = not is_merged(way * distance, distance, normals, distances, number)
+                            if counts:
                                 least = wp.abs(distance)
                                 nearest = distance
                                 normal = way

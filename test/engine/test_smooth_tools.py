@@ -281,18 +281,27 @@ def drum():
     return ring
 
 
-@pytest.mark.parametrize(("mesh", "least_known"), [(tray, 0.5), (drum, 0.3), (plate, 0.3)], ids=["tray", "drum", "plate"])
+def valley():
+    """A plate whose upper face is hollowed out along y by a degree on either side, of few large triangles."""
+    mesh = trimesh.creation.box((0.06, 0.06, 0.004))
+    halves = [mesh.copy().apply_translation([side, 0.0, -0.002]) for side in (0.03, -0.03)]
+    hollow = trimesh.util.concatenate(halves)
+    hollow.vertices[:, 2] += 0.02 * np.abs(hollow.vertices[:, 0])
+    return hollow
+
+
+@pytest.mark.parametrize(("mesh", "least_known"), [(tray, 0.5), (drum, 0.3), (plate, 0.3), (valley, 0.3)])
 @pytest.mark.parametrize("precision", ["single", "double"])
 def test_what_is_known_of_the_surface_is_what_a_search_would_find(make_smooth_world, mesh, least_known, precision):
     """To the bit, with grains that slide, roll, bounce and lie in corners and over edges of a tool that turns and swings."""
     lattice = np.stack(np.meshgrid(range(-2, 3), range(-2, 3), range(2), indexing="ij"), -1).reshape(-1, 3)
-    middle = {tray: [0.035, 0.03, 0.008], drum: [0.0, 0.0, -0.02], plate: [0.03, 0.01, 0.007]}[mesh]
-    common = {"gravity": [-1.0, -2.0, -9.81], "precision": precision, "friction": 0.4, "velocity": [0.0, 0.0, -0.3]}
+    middle = {tray: [0.035, 0.03, 0.008], drum: [0.0, 0.0, -0.02], plate: [0.03, 0.01, 0.007], valley: [0.004, 0.0, 0.0065]}[mesh]
+    common = {"gravity": [-1.0, -2.0, -9.81], "precision": precision, "friction": 0.4, "restitution": 0.1, "velocity": [0.0, 0.0, -0.3]}
     worlds = [make_smooth_world(0.0103 * lattice + middle, mesh(), **common) for _ in range(2)]
     known, contacts = [], []
     for turn in range(3):
         for world in worlds:
-            way, angle = [0.004 * turn, -0.003, 0.001 * turn], 0.06 * (turn + 1)
+            way, angle = [(0.012 if mesh is valley else 0.004) * turn, -0.003, 0.001 * turn], 0.06 * (turn + 1)
             world.apply(ToolPose("tool", np.array(way), np.array([0.0, np.sin(angle), 0.0, np.cos(angle)]), world.time + 0.02))
         knowing, searching = worlds
         for _ in range(round(0.02 / knowing.time_step)):

@@ -12,7 +12,7 @@ from sampler.geometry.surface import Surface
 from sand_sim.assembly.true_surface import outward_triangles
 from sand_sim.engine.kernel import kernel
 from sand_sim.engine.smooth_tools import SmoothTools
-from sand_sim.engine.triangle_tree import MERGED, TriangleTree, nearest_on_tree
+from sand_sim.engine.triangle_tree import TriangleTree, nearest_on_tree
 
 
 @kernel
@@ -30,9 +30,7 @@ def find(
     found = wp.mat33d()
     far = wp.vec3d(limit, limit, limit)
     for k in range(3):
-        distance, normal, _triangle = nearest_on_tree(
-            tree[0], boxes, corners, points[i], limit, found, far, k, wp.float64(MERGED)
-        )
+        distance, normal, _triangle = nearest_on_tree(tree[0], boxes, corners, points[i], limit, found, far, k, False)
         if distance < limit:
             found[k] = normal
             far[k] = distance
