@@ -59,8 +59,8 @@ def carry_over(old: Assembly, new: Assembly, replaced: int | None = None) -> Non
     if "tool.partner" in state:
         numbers = _particle_numbers(old.solver.arrays.tools, new.solver.arrays.tools, replaced)
         state["tool.partner"] = numbers[state["tool.partner"]]
-    if "tool.standing" in state:
-        state["tool.standing"] = np.zeros_like(state["tool.standing"])  # found on surfaces that may be others now
+    for name in {"tool.standing", "tool.near"} & state.keys():
+        state[name] = np.zeros_like(state[name])  # found on surfaces that may be others now
     new.solver.put_state(state)
     new.solver.expect_moves()
 

@@ -5,8 +5,8 @@ the surface is found, then the nearest that does not belong to it, then the near
 grain has in a corner of three walls. Each goes into the slot whose normal was like its own in the step before, so that friction
 remembers what it should.
 
-A grain that is far from the surface, or over one face of it and far from all else, is looked at again only once it has moved as
-far as it may until that could change; until then its height over that face is all there is to find.
+A grain looks through the whole surface only once in a while. That it is far from all, or which triangles are near, holds until it
+has moved as far as it may; over a face those that rise above it are enough, which are none on flat ground.
 """
 
 from functools import cache
@@ -20,24 +20,23 @@ from sand_sim.engine.kernel import kernel
 from sand_sim.engine.neighbours import build_put_back
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.tools import ToolTrack, rotation_at, tool_types
-from sand_sim.engine.triangle_tree import TriangleTree, nearest_on_tree, plant_tree, stands_on
+from sand_sim.engine.triangle_tree import TriangleTree, list_near, nearest_of_few, nearest_on_tree, plant_tree, stands_on
 from sand_sim.precision import Precision
 
 SLOTS = 3  # contacts of a grain with a smooth tool
 _SAME = 0.8  # cosine of the angle by which the normal of a contact may turn in one step
-_FAR = 0.25  # of a grain's radius beyond its reach: how far it is looked
-_NEAR = 0.05  # of it: gaps in which it is worth while to look for what else is near
-_ROUNDING = 1e-6  # of the reach, from the sides of a face: there it is the nearest beside its neighbours, however that is rounded
+_FAR, _NEAR = 0.25, 0.05  # of a grain's radius beyond its reach: how far is looked, and where triangles are noted
+_ROUNDING = 1e-6  # of the reach, from the sides of a face: there it is nearer than its neighbours, however that is rounded
 
 
 @wp.struct
 class Standing:
-    """What a search for contacts has found that holds for a while; kept with the first slot of a grain and a tool."""
+    """What a grain is near to, kept with its first slot for a tool; rows of ``near`` from there on name the triangles."""
 
-    at: wp.vec3d  # [m] centre of the grain then, in the tool's frame
-    free: wp.float64  # [m] from there it may move so far, and find the same; 0 where it must be looked anew
-    triangle: int  # over which it is; -1 if it is far from all
-    slot: int  # of the contact with that
+    at: wp.vec3d  # [m] centre of the grain when that was found, in the tool's frame
+    free: wp.float64  # [m] from there it may move so far; 0 where it must be looked anew
+    over: int  # triangle that it is over, on which it may stand; -1 if it is beside all
+    few: int  # triangles that are noted; -1 where there are too many
 
 
 class SmoothTools:
@@ -113,6 +112,7 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
         quantum: wp.float64,
         across: wp.float64,
         standing: wp.array(dtype=Standing),
+        near: wp.array2d(dtype=int),
         touch: wp.array(dtype=vec4),
         memory: wp.array(dtype=memory_vector),
     ):
@@ -129,65 +129,53 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
                 centre = in_tool_frame(here, states[tool], rotation, quantum)
                 radius = wp.float64(here[3]) * quantum
                 reach = radius + across
-                rounding = wp.float64(wp.static(_ROUNDING))
+                none, rounding = wp.mat33d(), reach * wp.float64(wp.static(_ROUNDING))
+                known = standing[contact]
+                moved = centre - known.at
+                holds = wp.dot(moved, moved) < known.free * known.free
+                if holds and known.over < 0 and known.few == 0:
+                    continue
+                if holds and known.over >= 0:
+                    above = wp.dot(corners[4 * known.over + 3], centre - corners[4 * known.over]) >= wp.float64(0.0)
+                    holds = above and stands_on(corners, known.over, centre, rounding)
+                if not holds:
+                    margin = radius * wp.float64(wp.static(_NEAR))
+                    far = reach + radius * wp.float64(wp.static(_FAR))
+                    distance, _n, nearest = nearest_on_tree(tree, boxes, corners, centre, far, none, wp.vec3d(), 0)
+                    known.at = centre
+                    known.free = distance - reach
+                    known.over = -1
+                    known.few = 0
+                    if known.free < margin:
+                        known.free = margin
+                        known.few = -1
+                        if distance >= wp.float64(0.0):
+                            if stands_on(corners, nearest, centre, rounding):
+                                known.over = nearest
+                            known.few = list_near(tree, boxes, corners, centre, reach + margin, known.over, near, contact)
+                        if known.few < 0:
+                            known.free = wp.float64(0.0)
+                    standing[contact] = known
                 normals = wp.mat33d()
                 distances = wp.vec3d()
                 number = int(0)
-                searching = int(0)
-                known = standing[contact]
-                moved = centre - known.at
-                over = int(known.triangle)
-                holds = wp.dot(moved, moved) < known.free * known.free
-                if holds and over < 0:
-                    continue
-                if holds:
-                    above = wp.dot(corners[4 * over + 3], centre - corners[4 * over]) >= wp.float64(0.0)
-                    holds = above and stands_on(corners, over, centre, reach * rounding)
-                if not holds:
-                    far = reach + radius * wp.float64(wp.static(_FAR))
-                    near = reach + radius * wp.float64(wp.static(_NEAR))
-                    distance, normal, nearest = nearest_on_tree(tree, boxes, corners, centre, far, normals, distances, 0, False)
-                    over = -1
-                    free = wp.max(distance - reach, wp.float64(0.0))
-                    number = int(distance < reach)
-                    normals[0] = normal
-                    distances[0] = distance
-                    # A grain whose centre is inside the tool has left all but the nearest face.
-                    if distance >= wp.float64(0.0) and distance < near:
-                        searching = number
-                        if stands_on(corners, nearest, centre, reach * rounding):
-                            # Whatever is higher than the face below could become nearer, or a second contact.
-                            rival, _n, _t = nearest_on_tree(tree, boxes, corners, centre, far, normals, distances, 1, True)
-                            if rival >= reach:
-                                searching = 0
-                            room = wp.min(wp.float64(0.5) * (rival - distance), rival - reach)
-                            if room > free:
-                                over = nearest
-                                free = room
-                    known.at = centre
-                    known.free = free * wp.float64(0.999)
-                    known.triangle = over
-                if over >= 0:  # the same instructions, whether it has just been found or was known, give the same bits
-                    distances[0] = wp.dot(corners[4 * over + 3], centre - corners[4 * over])
-                    number = int(distances[0] < reach)
-                if holds:
-                    at = contact + known.slot
-                    if number > 0:
-                        face = corners[4 * over + 3]
-                        touch[at] = vec4(real(face[0]), real(face[1]), real(face[2]), real(radius - distances[0]))
-                    else:
-                        touch[at] = vec4(real(0.0))
-                        if wp.static(history):
-                            memory[at] = memory_vector()
-                    continue
+                searching = int(1)
                 while searching > 0:
-                    distance, normal, _t = nearest_on_tree(tree, boxes, corners, centre, reach, normals, distances, number, False)
+                    distance = reach
+                    normal = wp.vec3d()
+                    if known.few >= 0:
+                        distance, normal = nearest_of_few(
+                            corners, near, contact, known.few, known.over, centre, reach, normals, distances, number
+                        )
+                    else:
+                        distance, normal, _t = nearest_on_tree(tree, boxes, corners, centre, reach, normals, distances, number)
                     searching = 0
                     if distance < reach:
                         normals[number] = normal
                         distances[number] = distance
                         number += 1
-                        if number < wp.static(SLOTS):
+                        # A grain whose centre is inside the tool has left all but the nearest face.
+                        if number < wp.static(SLOTS) and distance >= wp.float64(0.0) and known.few != 0:
                             searching = 1
                 taken = wp.vec3i(-1, -1, -1)  # contact in each slot
                 chosen = wp.vec3i(-1, -1, -1)  # slot of each contact
@@ -218,8 +206,6 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
                     normal = wp.vec3d(normals[k, 0], normals[k, 1], normals[k, 2])
                     overlap = real(radius - distances[k])
                     touch[contact + chosen[k]] = vec4(real(normal[0]), real(normal[1]), real(normal[2]), overlap)
-                known.slot = wp.max(chosen[0], 0)
-                standing[contact] = known
 
     return touch_smooth
 
@@ -263,7 +249,7 @@ def record_touching(arrays, recorder) -> None:
     if tools.smooth:
         inputs = [contacts.owner, contacts.partner, arrays.grains.place, tools.tool_of, tools.states, tools.tracks]
         inputs += [*arguments_of(tools.smooth), arrays.flags.steps_done, arrays.setting.dt, arrays.lattice.quantum]
-        inputs += [arrays.widest_reach, arrays.standing, arrays.touch, contacts.memory]
+        inputs += [arrays.widest_reach, arrays.standing, arrays.near, arrays.touch, contacts.memory]
         recorder.each(build_touch_smooth(arrays.recipe), contacts.pairs, inputs)
 
 

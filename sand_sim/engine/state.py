@@ -120,5 +120,5 @@ def _filled_arrays(arrays: DemArrays) -> dict[str, tuple[wp.array, Count]]:
     if arrays.old_touch is not None:
         found["tool.touch"] = (arrays.touch, arrays.tool_list.pairs)
     if arrays.standing is not None:
-        found["tool.standing"] = (arrays.standing, arrays.tool_list.pairs)
+        found |= {f"tool.{name}": (getattr(arrays, name), arrays.tool_list.pairs) for name in ("standing", "near")}
     return found

@@ -3,7 +3,7 @@
 import numpy as np
 
 from sand_sim.engine.arrays import DemArrays
-from sand_sim.engine.smooth_tools import SLOTS
+from sand_sim.engine.triangle_tree import FEW
 
 
 class StateError(ValueError):
@@ -70,9 +70,10 @@ def check_numbers(arrays: DemArrays, state: dict[str, np.ndarray]) -> None:
         if member.min() < -1 or member.max() >= arrays.bodies.members:
             raise StateError("array 'grains.member' points outside")
     if arrays.standing is not None:
-        standing = state["tool.standing"]
-        _within("tool.standing", standing["triangle"] + 1, arrays.tools.smooth.corners.shape[0] // 4 + 1)
-        _within("tool.standing", standing["slot"], SLOTS)
+        standing, triangles = state["tool.standing"], arrays.tools.smooth.corners.shape[0] // 4
+        _within("tool.standing", standing["over"] + 1, triangles + 1)
+        _within("tool.standing", standing["few"] + 1, FEW + 2)
+        _within("tool.near", state["tool.near"], triangles)
     if min(int(state["flags.steps_done"][0]), int(state["observed_steps"])) < 0:
         raise StateError("array 'flags.steps_done' is negative")
 
@@ -80,7 +81,7 @@ def check_numbers(arrays: DemArrays, state: dict[str, np.ndarray]) -> None:
 def _length(state: dict[str, np.ndarray], name: str, like: np.ndarray) -> int:
     """How long an array must be."""
     kind, _, part = name.partition(".")
-    if part in ("owner", "partner", "memory", "touch", "standing") or name == "met.order":
+    if part in ("owner", "partner", "memory", "touch", "standing", "near") or name == "met.order":
         return int(state["pair.number" if kind == "met" else f"{kind}.number"])
     return len(like)
 

@@ -104,7 +104,7 @@ def build_tool_search(recipe: Recipe, filling: bool) -> wp.Kernel:
                         at = wp.vec3d(wp.float64(local[0]), wp.float64(local[1]), wp.float64(local[2]))
                         limit = wp.float64(reach)
                         none = wp.mat33d()
-                        distance, _n, _t = nearest_on_tree(tree, boxes, corners, at, limit, none, wp.vec3d(), 0, False)
+                        distance, _n, _t = nearest_on_tree(tree, boxes, corners, at, limit, none, wp.vec3d(), 0)
                         if distance < limit:
                             if wp.static(filling):
                                 standing[found] = Standing()

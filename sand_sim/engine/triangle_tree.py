@@ -12,6 +12,7 @@ from sand_sim.engine.count import part_start
 
 _IN_LEAF = 4  # triangles at most
 _MERGED = math.cos(math.radians(30.0))
+FEW = 12  # triangles that are noted
 _FLAT = 1e-9  # of the distance searched: corners that rise less above a face lie in its plane, which is rounded
 
 
@@ -135,14 +136,68 @@ def is_merged(away: wp.vec3d, distance: wp.float64, normals: wp.mat33d, distance
 
 
 @wp.func
-def rises(
-    corners: wp.array(dtype=wp.vec3d), triangle: int, p: wp.vec3d, normal: wp.vec3d, distance: wp.float64, slack: wp.float64
-) -> bool:
-    """Whether any of a triangle is higher than the plane that lies at a distance below a point."""
-    height = wp.dot(normal, p) - distance + slack
-    on_a = wp.dot(normal, corners[4 * triangle]) > height
-    on_b = wp.dot(normal, corners[4 * triangle + 1]) > height
-    return on_a or on_b or wp.dot(normal, corners[4 * triangle + 2]) > height
+def rises(corners: wp.array(dtype=wp.vec3d), triangle: int, over: int, slack: wp.float64) -> bool:
+    """Whether a corner of a triangle is higher above the plane of another one than ``slack`` [m]."""
+    up = corners[4 * over + 3]
+    height = wp.dot(up, corners[4 * over]) + slack
+    on_a = wp.dot(up, corners[4 * triangle]) > height
+    on_b = wp.dot(up, corners[4 * triangle + 1]) > height
+    return on_a or on_b or wp.dot(up, corners[4 * triangle + 2]) > height
+
+
+@wp.func
+def is_near(boxes: wp.array(dtype=wp.vec3d), node: int, p: wp.vec3d, limit: wp.float64, slack: wp.float64) -> bool:
+    """Whether a box is nearer to a point than a limit [m]."""
+    gap = wp.max(wp.max(boxes[2 * node] - p, p - boxes[2 * node + 1]), wp.vec3d(wp.float64(0.0)))
+    return wp.dot(gap, gap) < limit * (limit + slack)
+
+
+@wp.func
+def triangles_in(tree: TriangleTree, leaf: int):
+    """Begin and end of the triangles of a leaf."""
+    first = part_start(tree.triangles, leaf - tree.leaves, tree.leaves)
+    last = part_start(tree.triangles, leaf - tree.leaves + 1, tree.leaves)
+    return tree.first_triangle + first, tree.first_triangle + last
+
+
+@wp.func
+def next_node(node: int) -> int:
+    """The node to look at after one and all below it; 0 after the last."""
+    after = node + 1
+    while after % 2 == 0:
+        after = after // 2
+    if after == 1:
+        after = 0
+    return after
+
+
+@wp.func
+def is_nearer(
+    corners: wp.array(dtype=wp.vec3d),
+    triangle: int,
+    p: wp.vec3d,
+    nearest: wp.float64,
+    slack: wp.float64,
+    normals: wp.mat33d,
+    distances: wp.vec3d,
+    number: int,
+):
+    """Whether a triangle is nearer than the ``nearest`` so far [m], its distance [m] and its normal."""
+    nearer = False
+    distance = nearest
+    way = wp.vec3d(wp.float64(0.0))
+    least = wp.abs(nearest)
+    a = corners[4 * triangle]
+    face = corners[4 * triangle + 3]
+    height = wp.dot(face, p - a)
+    # Further contacts are in front of their faces, or a wall's back would count beside its front.
+    if wp.abs(height) < least + slack and (number == 0 or height >= wp.float64(0.0)):
+        distance, way = nearest_on_triangle(p, a, corners[4 * triangle + 1], corners[4 * triangle + 2], face)
+        # Of a wall without thickness, which is there both ways, the side that faces the grain.
+        before = wp.abs(distance) < least + slack and distance > nearest and nearest < wp.float64(0.0)
+        if wp.abs(distance) < least or before:
+            nearer = number == 0 or not is_merged(way * distance, distance, normals, distances, number)
+    return nearer, distance, way
 
 
 @wp.func
@@ -155,55 +210,97 @@ def nearest_on_tree(
     normals: wp.mat33d,
     distances: wp.vec3d,
     number: int,
-    rivals: bool,
 ):
     """Distance [m] of the nearest place that belongs to none of the ``number`` contacts found before, its normal and triangle.
 
-    The distance is negative behind a face, and ``limit`` where nothing is nearer; the triangle is -1 then. With ``rivals`` it is
-    that of the nearest triangle which rises above the tangent plane of the one contact found before, wherever it does.
+    The distance is negative behind a face, and ``limit`` where nothing is nearer; the triangle is -1 then.
     """
-    least = limit
     nearest = limit
     slack = limit * wp.float64(1.0e-12)
     normal = wp.vec3d(wp.float64(0.0))
     triangle = int(-1)
     node = int(1)
     while node > 0:
-        low = boxes[2 * (tree.first_node + node)]
-        high = boxes[2 * (tree.first_node + node) + 1]
-        gap = wp.max(wp.max(low - p, p - high), wp.vec3d(wp.float64(0.0)))
-        near = wp.dot(gap, gap) < least * (least + slack)
+        near = is_near(boxes, tree.first_node + node, p, wp.abs(nearest), slack)
         if near and node < tree.leaves:
             node = 2 * node
         else:
             if near:
-                leaf = node - tree.leaves
-                first = part_start(tree.triangles, leaf, tree.leaves)
-                last = part_start(tree.triangles, leaf + 1, tree.leaves)
-                for k in range(tree.first_triangle + first, tree.first_triangle + last):
-                    a = corners[4 * k]
-                    face = corners[4 * k + 3]
-                    height = wp.dot(face, p - a)
-                    # Further contacts are in front of their faces, or a wall's back would count beside its front.
-                    if wp.abs(height) < least + slack and (number == 0 or height >= wp.float64(0.0)):
-                        distance, way = nearest_on_triangle(p, a, corners[4 * k + 1], corners[4 * k + 2], face)
-                        # Of a wall without thickness, which is there both ways, the side that faces the grain.
-                        before = wp.abs(distance) < least + slack and distance > nearest and nearest < wp.float64(0.0)
-                        if wp.abs(distance) < least or before:
-                            counts = number == 0
-                            if rivals:
-                                flat = limit * wp.float64(wp.static(_FLAT))
-                                counts = rises(corners, k, p, normals[0], distances[0], flat)
-                            elif number > 0:
-                                counts = not is_merged(way * distance, distance, normals, distances, number)
-                            if counts:
-                                least = wp.abs(distance)
-                                nearest = distance
-                                normal = way
-                                triangle = k
-            node += 1
-            while node % 2 == 0:
-                node = node // 2
-            if node == 1:
-                node = 0
+                first, last = triangles_in(tree, node)
+                for k in range(first, last):
+                    nearer, distance, way = is_nearer(corners, k, p, nearest, slack, normals, distances, number)
+                    if nearer:
+                        nearest = distance
+                        normal = way
+                        triangle = k
+            node = next_node(node)
     return nearest, normal, triangle
+
+
+@wp.func
+def list_near(
+    tree: TriangleTree,
+    boxes: wp.array(dtype=wp.vec3d),
+    corners: wp.array(dtype=wp.vec3d),
+    p: wp.vec3d,
+    limit: wp.float64,
+    over: int,
+    near: wp.array2d(dtype=int),
+    row: int,
+) -> int:
+    """Note the triangles that are no farther than ``limit`` [m] from a point, and tell how many they are; -1 if too many.
+
+    Where it is ``over`` one, 0 or greater, that one is left out, and so are those that nowhere rise above its plane.
+    """
+    none = wp.mat33d()
+    slack = limit * wp.float64(1.0e-12)
+    number = int(0)
+    node = int(1)
+    while node > 0:
+        close = is_near(boxes, tree.first_node + node, p, limit, slack)
+        if close and node < tree.leaves:
+            node = 2 * node
+        else:
+            if close:
+                first, last = triangles_in(tree, node)
+                for k in range(first, last):
+                    counts, _d, _w = is_nearer(corners, k, p, limit, slack, none, wp.vec3d(), 0)
+                    if over >= 0:
+                        counts = counts and k != over and rises(corners, k, over, limit * wp.float64(wp.static(_FLAT)))
+                    if counts:
+                        if number < wp.static(FEW):
+                            near[row + number // 4, number % 4] = k
+                        number += 1
+            node = next_node(node)
+    if number > wp.static(FEW):
+        number = -1
+    return number
+
+
+@wp.func
+def nearest_of_few(
+    corners: wp.array(dtype=wp.vec3d),
+    near: wp.array2d(dtype=int),
+    row: int,
+    few: int,
+    over: int,
+    p: wp.vec3d,
+    limit: wp.float64,
+    normals: wp.mat33d,
+    distances: wp.vec3d,
+    number: int,
+):
+    """As ``nearest_on_tree``, of the triangles from ``list_near`` and the one below the point: distance and normal."""
+    nearest = limit
+    slack = limit * wp.float64(1.0e-12)
+    normal = wp.vec3d(wp.float64(0.0))
+    for k in range(-1, few):
+        triangle = over
+        if k >= 0:
+            triangle = near[row + k // 4, k % 4]
+        if triangle >= 0:
+            nearer, distance, way = is_nearer(corners, triangle, p, nearest, slack, normals, distances, number)
+            if nearer:
+                nearest = distance
+                normal = way
+    return nearest, normal

@@ -30,7 +30,7 @@ def find(
     found = wp.mat33d()
     far = wp.vec3d(limit, limit, limit)
     for k in range(3):
-        distance, normal, _triangle = nearest_on_tree(tree[0], boxes, corners, points[i], limit, found, far, k, False)
+        distance, normal, _triangle = nearest_on_tree(tree[0], boxes, corners, points[i], limit, found, far, k)
         if distance < limit:
             found[k] = normal
             far[k] = distance
