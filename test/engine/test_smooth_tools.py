@@ -301,16 +301,16 @@ def test_what_is_known_of_the_surface_is_what_a_search_would_find(make_smooth_wo
         "precision": precision,
         "friction": 0.4,
         "restitution": 0.1,
-        "velocity": [0.0, 0.0, -0.3],
+        "velocity": [0.0, 0.0, -1.0],
     }
     worlds = [make_smooth_world(0.0103 * lattice + middle, mesh(), **common) for _ in range(2)]
     known, contacts = [], []
     for turn in range(3):
         for world in worlds:
-            way, angle = [(0.012 if mesh is valley else 0.004) * turn, -0.003, 0.001 * turn], 0.06 * (turn + 1)
-            world.apply(ToolPose("tool", np.array(way), np.array([0.0, np.sin(angle), 0.0, np.cos(angle)]), world.time + 0.02))
+            way, angle = [0.005 * turn, -0.003, 0.001 * turn], 0.03 * (turn + 1)
+            world.apply(ToolPose("tool", np.array(way), np.array([0.0, np.sin(angle), 0.0, np.cos(angle)]), world.time + 0.008))
         knowing, searching = worlds
-        for _ in range(round(0.02 / knowing.time_step)):
+        for _ in range(round(0.008 / knowing.time_step)):
             before = knowing.assembly.solver.arrays.standing.numpy()["at"].copy()
             knowing.step(1)
             searching.assembly.solver.arrays.standing.zero_()
