@@ -20,11 +20,11 @@ from sand_sim.engine.neighbours import HITS
 from sand_sim.engine.plungers import SUM_BLOCK, Plungers
 from sand_sim.engine.recipe import Recipe
 from sand_sim.engine.skin import Skin
-from sand_sim.engine.smooth_tools import SLOTS, Standing
+from sand_sim.engine.smooth_tools import Standing
 from sand_sim.engine.sorting import SortedItems
 from sand_sim.engine.surfaces import Surface
 from sand_sim.engine.tool_body import ToolBody, Tools
-from sand_sim.engine.triangle_tree import FEW
+from sand_sim.engine.triangle_tree import IN_ROW
 from sand_sim.grain_table import GrainTable
 from sand_sim.integrator import VERLET
 
@@ -182,7 +182,7 @@ class DemArrays:
         if kept is None or kept.shape[0] < room:
             self.touch = wp.zeros(room, dtype=vec4, device=self.device)
             self.standing = wp.zeros(room, dtype=Standing, device=self.device)
-            self.near = wp.zeros((room, FEW // SLOTS), dtype=int, device=self.device)
+            self.near = wp.zeros((room, IN_ROW), dtype=int, device=self.device)
             if kept is not None:
                 wp.copy(self.touch, kept, count=kept.shape[0])
             self.old_touch = wp.zeros(room, dtype=vec4, device=self.device) if self.recipe.history else None

@@ -12,7 +12,8 @@ from sand_sim.engine.count import part_start
 
 _IN_LEAF = 4  # triangles at most
 _MERGED = math.cos(math.radians(30.0))
-FEW = 12  # triangles that are noted
+IN_ROW = 4  # triangles that are noted in one row
+FEW = 3 * IN_ROW  # in all: a grain has a row for each of its slots
 _FLAT = 1e-9  # of the distance searched: corners that rise less above a face lie in its plane, which is rounded
 
 
@@ -269,7 +270,7 @@ def list_near(
                         counts = counts and k != over and rises(corners, k, over, limit * wp.float64(wp.static(_FLAT)))
                     if counts:
                         if number < wp.static(FEW):
-                            near[row + number // 4, number % 4] = k
+                            near[row + number // wp.static(IN_ROW), number % wp.static(IN_ROW)] = k
                         number += 1
             node = next_node(node)
     if number > wp.static(FEW):
@@ -297,7 +298,7 @@ def nearest_of_few(
     for k in range(-1, few):
         triangle = over
         if k >= 0:
-            triangle = near[row + k // 4, k % 4]
+            triangle = near[row + k // wp.static(IN_ROW), k % wp.static(IN_ROW)]
         if triangle >= 0:
             nearer, distance, way = is_nearer(corners, triangle, p, nearest, slack, normals, distances, number)
             if nearer:
