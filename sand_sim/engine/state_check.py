@@ -3,6 +3,7 @@
 import numpy as np
 
 from sand_sim.engine.arrays import DemArrays
+from sand_sim.engine.smooth_tools import SLOTS
 from sand_sim.engine.triangle_tree import FEW
 
 
@@ -74,8 +75,17 @@ def check_numbers(arrays: DemArrays, state: dict[str, np.ndarray]) -> None:
         _within("tool.standing", standing["over"] + 1, triangles + 1)
         _within("tool.standing", standing["few"] + 1, FEW + 2)
         _within("tool.near", state["tool.near"], triangles)
+        _check_slots(state["tool.partner"], arrays.tools.smooth.trees.numpy())
     if min(int(state["flags.steps_done"][0]), int(state["observed_steps"])) < 0:
         raise StateError("array 'flags.steps_done' is negative")
+
+
+def _check_slots(partner: np.ndarray, trees: np.ndarray) -> None:
+    """See that all slots of a grain and a smooth tool are listed one behind the other."""
+    for first in trees["first_slot"][trees["leaves"] > 0]:
+        rows = np.flatnonzero(partner == first)[:, None] + np.arange(SLOTS)
+        if rows.size and (rows.max() >= len(partner) or np.any(partner[rows] != first + np.arange(SLOTS))):
+            raise StateError("array 'tool.partner' lacks slots of a smooth tool")
 
 
 def _length(state: dict[str, np.ndarray], name: str, like: np.ndarray) -> int:

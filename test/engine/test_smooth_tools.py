@@ -335,6 +335,10 @@ def test_a_state_that_points_to_faces_which_are_not_there_is_refused(make_smooth
         (state["tool.near"] if field == "near" else state["tool.standing"][field])[:] = number
         with pytest.raises(ValueError, match=r"array 'tool\.(standing|near)' points outside"):
             world.check_state(state)
+    state = world.save()
+    state["tool.partner"][-1] = state["tool.partner"][0]
+    with pytest.raises(ValueError, match=r"array 'tool\.partner' lacks slots of a smooth tool"):
+        world.check_state(state)
     world.check_state(world.save())
 
 
