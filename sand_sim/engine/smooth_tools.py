@@ -81,6 +81,49 @@ def build_in_tool_frame(precision: Precision) -> wp.Function:
     return in_tool_frame
 
 
+@wp.func
+def holds(known: Standing, corners: wp.array(dtype=wp.vec3d), centre: wp.vec3d, reach: wp.float64) -> bool:
+    """Whether what is known of a grain that is somewhere else now is all that matters still."""
+    moved = centre - known.at
+    good = wp.dot(moved, moved) < known.free * known.free
+    if good and known.over >= 0:
+        above = wp.dot(corners[4 * known.over + 3], centre - corners[4 * known.over]) >= wp.float64(0.0)
+        good = above and stands_on(corners, known.over, centre, reach * wp.float64(wp.static(_ROUNDING)))
+    return good
+
+
+@wp.func
+def look_around(
+    tree: TriangleTree,
+    boxes: wp.array(dtype=wp.vec3d),
+    corners: wp.array(dtype=wp.vec3d),
+    near: wp.array2d(dtype=int),
+    row: int,
+    centre: wp.vec3d,
+    radius: wp.float64,
+    reach: wp.float64,
+) -> Standing:
+    """What a grain is near to; the triangles are noted from a row of ``near`` on."""
+    margin = radius * wp.float64(wp.static(_NEAR))
+    far = reach + radius * wp.float64(wp.static(_FAR))
+    distance, _n, nearest = nearest_on_tree(tree, boxes, corners, centre, far, wp.mat33d(), wp.vec3d(), 0)
+    found = Standing()
+    found.at = centre
+    found.free = distance - reach
+    found.over = -1
+    if found.free < margin:
+        found.free = margin
+        found.few = -1
+        # A grain whose centre is inside the tool may be farther from the nearest face than what would be noted.
+        if distance >= wp.float64(0.0):
+            if stands_on(corners, nearest, centre, reach * wp.float64(wp.static(_ROUNDING))):
+                found.over = nearest
+            found.few = list_near(tree, boxes, corners, centre, reach + margin, found.over, near, row)
+        if found.few < 0:
+            found.free = wp.float64(0.0)
+    return found
+
+
 @cache
 def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
     """Kernel that finds the contacts of grains with the surfaces of smooth tools.
@@ -129,33 +172,12 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
                 centre = in_tool_frame(here, states[tool], rotation, quantum)
                 radius = wp.float64(here[3]) * quantum
                 reach = radius + across
-                none, rounding = wp.mat33d(), reach * wp.float64(wp.static(_ROUNDING))
                 known = standing[contact]
-                moved = centre - known.at
-                holds = wp.dot(moved, moved) < known.free * known.free
-                if holds and known.over < 0 and known.few == 0:
-                    continue
-                if holds and known.over >= 0:
-                    above = wp.dot(corners[4 * known.over + 3], centre - corners[4 * known.over]) >= wp.float64(0.0)
-                    holds = above and stands_on(corners, known.over, centre, rounding)
-                if not holds:
-                    margin = radius * wp.float64(wp.static(_NEAR))
-                    far = reach + radius * wp.float64(wp.static(_FAR))
-                    distance, _n, nearest = nearest_on_tree(tree, boxes, corners, centre, far, none, wp.vec3d(), 0)
-                    known.at = centre
-                    known.free = distance - reach
-                    known.over = -1
-                    known.few = 0
-                    if known.free < margin:
-                        known.free = margin
-                        known.few = -1
-                        if distance >= wp.float64(0.0):
-                            if stands_on(corners, nearest, centre, rounding):
-                                known.over = nearest
-                            known.few = list_near(tree, boxes, corners, centre, reach + margin, known.over, near, contact)
-                        if known.few < 0:
-                            known.free = wp.float64(0.0)
+                if not holds(known, corners, centre, reach):
+                    known = look_around(tree, boxes, corners, near, contact, centre, radius, reach)
                     standing[contact] = known
+                elif known.over < 0 and known.few == 0:
+                    continue
                 normals = wp.mat33d()
                 distances = wp.vec3d()
                 number = int(0)
