@@ -117,8 +117,6 @@ def _filled_arrays(arrays: DemArrays) -> dict[str, tuple[wp.array, Count]]:
         for part in ("owner", "partner", "memory"):
             if getattr(contacts, part) is not None:
                 found[f"{name}.{part}"] = (getattr(contacts, part), contacts.pairs)
-    if arrays.old_touch is not None:
-        found["tool.touch"] = (arrays.touch, arrays.tool_list.pairs)
-    if arrays.standing is not None:
-        found |= {f"tool.{name}": (getattr(arrays, name), arrays.tool_list.pairs) for name in ("standing", "near")}
+    if arrays.touch is not None:  # what is known holds only beside what was touched then
+        found |= {f"tool.{name}": (getattr(arrays, name), arrays.tool_list.pairs) for name in ("touch", "standing", "near")}
     return found

@@ -342,6 +342,21 @@ def test_a_state_that_points_to_faces_which_are_not_there_is_refused(make_smooth
     world.check_state(world.save())
 
 
+def test_a_world_without_memory_goes_back_to_where_nothing_was_touched(make_smooth_world):
+    """A grain above a plate, put back there from its contact, falls on as if it had not been there."""
+    common = {"velocity": [0.0, 0.0, -0.3], "contact": {"tangential": "none"}}
+    world = make_smooth_world([[0.001, 0.002, RADIUS + 0.0006]], plate(), **common)
+    world.step(1)
+    above = world.save()
+    while world.observe().health.contacts == 0:
+        world.step(10)
+    world.restore(above)
+    world.step(5)
+    seen = world.observe()
+    assert seen.grains.velocity[0] == pytest.approx([0.0, 0.0, -0.3], abs=1e-12)
+    assert seen.tool("tool").force == pytest.approx([0.0] * 3, abs=1e-12)
+
+
 def test_a_sheet_is_as_thick_as_asked(make_smooth_world):
     """A plate modelled as a surface without thickness, 3 mm thick, carries a grain 1.5 mm above that surface."""
     sheet = trimesh.Trimesh(
