@@ -34,9 +34,9 @@ class Standing:
     """What a grain is near to, kept with its first slot for a tool; rows of ``near`` from there on name the triangles."""
 
     at: wp.vec3d  # [m] centre of the grain when that was found, in the tool's frame
-    free: wp.float64  # [m] from there it may move so far; 0 where it must be looked anew
+    free: wp.float64  # [m] from there it may move so far before it is looked anew
     over: int  # triangle that it is over, on which it may stand; -1 if it is beside all
-    few: int  # triangles that are noted; -1 where there are too many
+    few: int  # triangles that are noted; -1 where there are too many, and the whole surface is searched each step
 
 
 class SmoothTools:
@@ -119,8 +119,6 @@ def look_around(
             if stands_on(corners, nearest, centre, reach * wp.float64(wp.static(_ROUNDING))):
                 found.over = nearest
             found.few = list_near(tree, boxes, corners, centre, reach + margin, found.over, near, row)
-        if found.few < 0:
-            found.free = wp.float64(0.0)
     return found
 
 
@@ -196,6 +194,11 @@ def build_touch_smooth(recipe: Recipe) -> wp.Kernel:
                         normals[number] = normal
                         distances[number] = distance
                         number += 1
+                        # Something else is nearer than the face below: what lies in the plane of that counts, and was not noted.
+                        if number == 1 and known.over >= 0 and known.few > 0:
+                            k = 4 * known.over
+                            if distance < wp.dot(corners[k + 3], centre - corners[k]):
+                                known.few = -1
                         # A grain whose centre is inside the tool has left all but the nearest face.
                         if number < wp.static(SLOTS) and distance >= wp.float64(0.0) and known.few != 0:
                             searching = 1

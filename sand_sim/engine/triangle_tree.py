@@ -273,6 +273,8 @@ def list_near(
                             near[row + number // wp.static(IN_ROW), number % wp.static(IN_ROW)] = k
                         number += 1
             node = next_node(node)
+            if number > wp.static(FEW):
+                node = 0
     if number > wp.static(FEW):
         number = -1
     return number
