@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+_APART = 0.25  # of its length by which a triangle is farther along one rim than along the other, at most
 _AREA = 0.02, 0.1  # of a component's area: a bridge takes so much at least and at most
 _ALONG = 0.5  # cosine between the way across and what either rim goes around, at least
 _AHEAD = 0.2  # of a rim, by length, which is the end of walls that run towards the other one; of zigzags it is half
@@ -43,7 +44,8 @@ def _face(vertices: np.ndarray, faces: np.ndarray, rims: list[np.ndarray], area:
 def bridge(vertices: np.ndarray, first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Triangles of least area from one rim to another, each with corners of both (Fuchs, Kedem & Uselton 1977).
 
-    They begin at the shortest way across, which is not always where the least of all would.
+    They begin at the shortest way across, which is not always where the least of all would, and advance on both rims alike: two
+    cones that meet in a corner have hardly more area than a tube.
 
     Args:
         vertices: shape (k, 3) [m].
@@ -60,11 +62,15 @@ def bridge(vertices: np.ndarray, first: np.ndarray, second: np.ndarray) -> tuple
     place, other = vertices[a], vertices[back]
     on_first = 0.5 * np.linalg.norm(np.cross((place[1:] - place[:-1])[:, None], other - place[:-1, None]), axis=2)
     on_second = 0.5 * np.linalg.norm(np.cross(other[1:] - other[:-1], place[:, None] - other[:-1]), axis=2)
+    shares = _shares(place), _shares(other)
+    most = max(_APART, *(np.diff(share).max() for share in shares))
+    apart = np.abs(shares[0][:, None] - shares[1]) > most
     least = np.empty((len(a), len(back)))
     for k in range(len(a)):  # come from the corner before on the first rim, then go on along the second where that is less
         along = np.append(0.0, np.cumsum(on_second[k]))
         come = least[k - 1] + on_first[k - 1] if k else np.append(0.0, np.full(len(back) - 1, np.inf))
-        least[k] = along + np.minimum.accumulate(come - along)
+        least[k] = along + np.minimum.accumulate(np.where(apart[k], np.inf, come) - along)
+        least[k, apart[k]] = np.inf
     k, m, triangles = len(a) - 1, len(back) - 1, []
     while k or m:
         if not m or (k and least[k - 1, m] + on_first[k - 1, m] <= least[k, m - 1] + on_second[k, m - 1]):
@@ -74,6 +80,12 @@ def bridge(vertices: np.ndarray, first: np.ndarray, second: np.ndarray) -> tuple
             triangles.append([a[k], back[m], back[m - 1]])
             m -= 1
     return np.concatenate([a, b]), np.array(triangles, np.int64)
+
+
+def _shares(path: np.ndarray) -> np.ndarray:
+    """How far along a path its corners lie, 0 to 1."""
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1)))
+    return along / max(along[-1], 1e-300)
 
 
 @dataclass(frozen=True)

@@ -31,9 +31,10 @@ def bridges(mesh):
     return len(rims(mesh)) - len(rims(mesh, bridged=True))
 
 
-@pytest.mark.parametrize("place", range(3))
-def test_a_missing_section_of_a_ring_comes_back(place):
-    whole = ring()
+@pytest.mark.parametrize("shape", [(0.07, 72), (0.1, 72), (0.07, 200)])
+@pytest.mark.parametrize("place", range(4))
+def test_a_missing_section_of_a_ring_comes_back(place, shape):
+    whole = ring(*shape)
     broken = damaged(whole, "hole", place)
     assert bridges(broken) == 1
     mended = repair_mesh(broken)
@@ -74,7 +75,7 @@ def test_a_hole_through_both_skins_of_a_plate_is_no_tunnel():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_no_other_triangles_from_rim_to_rim_have_less_area(seed):
+def test_no_other_triangles_that_advance_on_both_rims_alike_have_less_area(seed):
     random = np.random.default_rng(seed)
     angle = np.linspace(0.0, 2.0 * np.pi, 5, endpoint=False)
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(5)], axis=1)
@@ -85,11 +86,18 @@ def test_no_other_triangles_from_rim_to_rim_have_less_area(seed):
     def area(corners):
         return np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0])) / 2.0
 
-    least = np.inf
+    def shares(path):
+        along = np.cumsum([0.0, *np.linalg.norm(np.diff(vertices[path], axis=0), axis=1)])
+        return along / along[-1]
+
+    first, second, least = shares(a), shares(back), np.inf
+    most = max(0.25, np.diff(first).max(), np.diff(second).max())
     for steps in combinations(range(9), 5):  # of nine those that go on along the first rim
         i, total = 0, 0.0
         for k in range(9):
             total += area(vertices[[a[i], back[k - i], a[i + 1] if k in steps else back[k - i + 1]]])
             i += k in steps
+            if abs(first[i] - second[k + 1 - i]) > most:
+                total = np.inf
         least = min(least, total)
     assert sum(area(vertices[corners]) for corners in triangles) == pytest.approx(least, rel=1e-12)
