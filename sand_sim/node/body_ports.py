@@ -46,7 +46,8 @@ class BodyPorts:
     ):
         self._parameters, self._simulation, self._active, self._frames = parameters, simulation, active, frames
         self._model, self._turn, name = model, np.asarray(model.body.pose.orientation), model.body.name
-        taken = {parameters["frame_id"], *(parameters[f"tools.{tool.name}.frame"] for tool in simulation.world.scene.tools)}
+        of_tools = (parameters[f"tools.{tool.name}.frame"] for tool in simulation.world.scene.tools)
+        taken = {parameters["frame_id"], *frames.names, *of_tools}
         self._frame_id = f"bodies/{name}" if name in taken else name
         topic = f"~/bodies/{topic_part(name)}"
         self._odometry = connections.publisher(Odometry, f"{topic}/odometry")

@@ -9,6 +9,7 @@ from sand_sim.scene.reading_poses import read_pose
 from sand_sim.scene.types import Pose, Vector, Waypoint
 
 _POSE, _MOTION = ("position", "orientation", "rpy"), ("velocity", "spin", "oscillation")
+_FASTEST_SPIN = 1e5  # [rad/s]; far beyond, poses to pass would fill memory
 _FASTEST_SINE = 1000.0  # [Hz], of which a period still has many time steps
 
 
@@ -54,6 +55,8 @@ def _motion(stop: Field) -> Motion:
         amplitude = sine["amplitude"].direction()
         frequency = sine["frequency"].number(above=0.0, most=_FASTEST_SINE, unit="Hz")
     velocity, spin = (stop.optional(key, Field.vector, still) for key in ("velocity", "spin"))
+    if math.hypot(*spin) > _FASTEST_SPIN:
+        raise stop["spin"].refuse(f"must be at most {_FASTEST_SPIN:g} [rad/s], got {list(spin)}")
     return Motion(velocity, spin, amplitude, frequency)
 
 

@@ -138,6 +138,12 @@ def test_a_body_may_be_called_as_the_world_frame(client, start_node):
     assert acting.numpy()["force"][0] == pytest.approx([0.02, 0.0, 0.0], abs=1e-12)
 
 
+def test_a_body_called_as_a_fixed_frame_gets_another_one(start_node):
+    """Else the frame would have two parents."""
+    node = start_node(AFLOAT | {"bodies": {"base": AFLOAT["bodies"]["ball-1"]}}, frame_names=["base"])
+    assert node._movers[-1]._frame_id == "bodies/base"
+
+
 def test_bodies_that_would_share_a_topic_are_refused(start_node):
     ball = AFLOAT["bodies"]["ball-1"]
     other = ball | {"pose": {"position": [0.1, 0.1, 0.2]}}

@@ -164,6 +164,11 @@ def test_the_height_of_a_fill_is_that_above_its_region(low, high, fits):
         ),
         (
             ("tools", "spade", "trajectory"),
+            [{"time": 0}, {"time": 1, "spin": [0, 1e9, 0]}],
+            "tools.spade.trajectory[1].spin: must be at most 100000 [rad/s]",
+        ),
+        (
+            ("tools", "spade", "trajectory"),
             [{"time": 0}, {"time": 1, "velocity": [0, 0, 1], "rpy": [0, 0, 0]}],
             "tools.spade.trajectory[1]: give either a pose (position, orientation, rpy) or a motion",
         ),
