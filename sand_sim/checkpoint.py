@@ -20,7 +20,7 @@ from sand_sim.assembly.scene_identity import find_difference
 from sand_sim.world import World
 
 _MAGIC = b"sand_sim checkpoint "
-_VERSION = b"1\n"
+_VERSION = b"2\n"
 _LENGTH = 8  # bytes of a length, little-endian
 _CHECKSUM = hashlib.sha256().digest_size
 _GROUPS = ("state", "history")

@@ -116,8 +116,8 @@ def test_each_single_byte_counts(written):
 
 
 def test_another_format_is_named(written):
-    written.write_bytes(written.read_bytes().replace(b"checkpoint 1", b"checkpoint 2", 1))
-    with pytest.raises(CheckpointError, match="is of format 2, this sand_sim reads 1"):
+    written.write_bytes(written.read_bytes().replace(b"checkpoint 2", b"checkpoint 1", 1))
+    with pytest.raises(CheckpointError, match="is of format 1, this sand_sim reads 2"):
         read_checkpoint(written)
 
 
@@ -136,7 +136,7 @@ def test_what_a_sound_checksum_lets_through_is_refused_too(tmp_path, header, sha
     array = io.BytesIO()
     np.lib.format.write_array_header_1_0(array, {"descr": "<f8", "fortran_order": False, "shape": shape})
     words = json.dumps({"time": 0.0, "steps": 0, "commands": {}, "state": ["one"], "history": []} | header).encode()
-    content = b"sand_sim checkpoint 1\n" + len(words).to_bytes(8, "little") + words + array.getvalue() + bytes(8)
+    content = b"sand_sim checkpoint 2\n" + len(words).to_bytes(8, "little") + words + array.getvalue() + bytes(8)
     path = tmp_path / "strange.checkpoint"
     path.write_bytes(content + hashlib.sha256(content).digest())
     with pytest.raises(DamagedCheckpointError, match="cannot be understood"):
@@ -368,7 +368,7 @@ def test_a_full_disk_is_told_once_and_left_behind(world, tmp_path, monkeypatch):
 def test_header_can_be_read_by_other_programs(written):
     content = written.read_bytes()
     line, rest = content.split(b"\n", 1)
-    assert line == b"sand_sim checkpoint 1"
+    assert line == b"sand_sim checkpoint 2"
     header = json.loads(rest[8 : 8 + int.from_bytes(rest[:8], "little")])
     assert header["grains"] == 32
     assert header["precision"] == "single"

@@ -144,7 +144,7 @@ def test_a_state_is_loaded_into_the_running_simulation(scene, uninterrupted, tmp
 
 def test_a_bad_file_changes_nothing_and_is_named(scene, uninterrupted, tmp_path):
     path = tmp_path / "bad.checkpoint"
-    path.write_bytes(b"sand_sim checkpoint 1\n" + bytes(1000))
+    path.write_bytes(b"sand_sim checkpoint 2\n" + bytes(1000))
     with Running(scene) as running:
         running.send(scene, 0.0, scene.duration)
         running.wait_until(MIDDLE)
