@@ -119,6 +119,8 @@ def look_around(
             if stands_on(corners, nearest, centre, reach * wp.float64(wp.static(_ROUNDING))):
                 found.over = nearest
             found.few = list_near(tree, boxes, corners, centre, reach + margin, found.over, near, row)
+            if found.few < 0:
+                found.over = -1
     return found
 
 

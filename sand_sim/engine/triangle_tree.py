@@ -274,9 +274,8 @@ def list_near(
                         number += 1
             node = next_node(node)
             if number > wp.static(FEW):
+                number = -1
                 node = 0
-    if number > wp.static(FEW):
-        number = -1
     return number
 
 

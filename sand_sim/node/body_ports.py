@@ -112,11 +112,11 @@ def body_ports(
     Raises:
         ValueError: if two bodies would share their topics, naming both.
     """
-    of_part: dict[str, str] = {}
-    for name in (model.body.name for model in simulation.world.assembly.bodies):
+    models, of_part = simulation.world.assembly.bodies, {}
+    for name in (model.body.name for model in models):
         if (first := of_part.setdefault(topic_part(name), name)) != name:
             raise ValueError(f"scene: bodies '{first}' and '{name}' would share '~/bodies/{topic_part(name)}'; rename one")
-    return [BodyPorts(connections, parameters, simulation, active, frames, body) for body in simulation.world.assembly.bodies]
+    return [BodyPorts(connections, parameters, simulation, active, frames, model) for model in models]
 
 
 def topic_part(name: str) -> str:
